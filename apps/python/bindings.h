@@ -46,6 +46,7 @@ void bind_errors(py::module_& m);
 void bind_result(py::module_& m);
 void bind_machine(py::module_& m);
 void bind_log(py::module_& m);
+void bind_mapping(py::module_& m);
 void bind_learning(py::module_& m);
 void bind_diagnosis(py::module_& m);
 void bind_motion(py::module_& m);

@@ -132,8 +132,9 @@ void bind_log(py::module_& m) {
             return telling(std::move(log));
           },
           py::arg("path"), py::arg("machine"), py::arg("mapping") = py::none(),
-          "Reads a log (CSV or MAT, docs/log_format.md). `mapping`: path of a mapping file for "
-          "other column names. Raises InputError.")
+          "Reads a log: CSV, MAT to v7.3 (docs/log_format.md), MDF 4, MCAP, traces of CAN\n"
+          "(docs/recordings.md). `mapping`: path of a mapping file for other column names and the "
+          "database\nof CAN frames. Raises InputError.")
       .def_static(
           "from_arrays", &log_from_arrays, py::arg("columns"), py::arg("machine"),
           py::arg("name") = "arrays", py::arg("mapping") = py::none(),

@@ -10,6 +10,7 @@ PYBIND11_MODULE(_sparflow, m) {
   bind_result(m);
   bind_machine(m);
   bind_log(m);
+  bind_mapping(m);
   bind_learning(m);
   bind_diagnosis(m);
   bind_motion(m);

@@ -57,6 +57,7 @@ class Balance {
   void step();
   void store(const VectorXd& theta);
   void free_directions(const MatrixXd& information);
+  double load_over_noise() const;
   void intervals();
 
   const std::vector<LoadRows>& loads_;
@@ -244,6 +245,23 @@ void Balance::store(const VectorXd& theta) {
   fit_.masses = theta_.head(unknowns_);
 }
 
+/// Load of the rows in units of their noise: what counts as large.
+double Balance::load_over_noise() const {
+  double load = 0.0;
+  Index count = 0;
+  for (std::size_t i = 0; i < loads_.size(); ++i) {
+    if (!fit_.used[i]) continue;
+    const LoadRows& l = loads_[i];
+    const VectorXd all = l.known + l.inertia + l.masses * fit_.masses;
+    const VectorXd r = l.load_cell ? VectorXd(l.force - all)
+                                   : VectorXd((l.pressure_a - l.pressure_b) * fit_.areas[i].piston +
+                                              fit_.areas[i].rod * l.pressure_b - all);
+    load += all.squaredNorm() / std::max(std::pow(robust_std(r), 2.0), 1e-12);
+    count += l.rows();
+  }
+  return std::sqrt(load / static_cast<double>(std::max<Index>(count, 1)));
+}
+
 /// Directions of the masses that the rows do not determine beside all else.
 void Balance::free_directions(const MatrixXd& information) {
   if (unknowns_ == 0) return;
@@ -278,36 +296,45 @@ void Balance::free_directions(const MatrixXd& information) {
       scaled(a, b) = own(i, j) / (unit[i] * unit[j]);
     }
   }
-  // Load of the rows in units of their noise: what counts as large.
-  double load = 0.0;
-  Index count = 0;
-  for (std::size_t i = 0; i < loads_.size(); ++i) {
-    if (!fit_.used[i]) continue;
-    const LoadRows& l = loads_[i];
-    const VectorXd all = l.known + l.inertia + l.masses * fit_.masses;
-    const VectorXd r = l.load_cell ? VectorXd(l.force - all)
-                                   : VectorXd((l.pressure_a - l.pressure_b) * fit_.areas[i].piston +
-                                              fit_.areas[i].rod * l.pressure_b - all);
-    load += all.squaredNorm() / std::max(std::pow(robust_std(r), 2.0), 1e-12);
-    count += l.rows();
-  }
-  load = std::sqrt(load / static_cast<double>(std::max<Index>(count, 1)));
+  const double limit = options_.undetermined * std::max(load_over_noise(), 10.0);
+  const auto undetermined = [&](double along) {
+    return 1.0 / std::sqrt(std::max(along / correlated_, 1e-300)) >= limit;
+  };
+  std::vector<VectorXd> confounded;
   if (n > 0) {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scaled);
-    for (Index k = 0; k < n; ++k) {
-      const double information_along = std::max(eigen.eigenvalues()[k], 0.0) / correlated_;
-      const double deviation = 1.0 / std::sqrt(std::max(information_along, 1e-300));
-      if (deviation < options_.undetermined * std::max(load, 10.0)) continue;
+    Index open = 0;  // eigenvalues ascend
+    while (open < n && undetermined(eigen.eigenvalues()[open])) ++open;
+    // Of what is free, turned so that its forces are apart: what has a force that would be determined alone.
+    MatrixXd alone(n, n);
+    for (Index a = 0; a < n; ++a) {
+      for (Index b = 0; b < n; ++b) {
+        const Index i = live[static_cast<std::size_t>(a)], j = live[static_cast<std::size_t>(b)];
+        alone(a, b) = information(i, j) / (unit[i] * unit[j]);
+      }
+    }
+    const MatrixXd within = eigen.eigenvectors().leftCols(open);
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> forces =
+        open > 0 ? Eigen::SelfAdjointEigenSolver<MatrixXd>(within.transpose() * alone * within)
+                 : Eigen::SelfAdjointEigenSolver<MatrixXd>();
+    for (Index k = 0; k < open; ++k) {
       VectorXd direction = VectorXd::Zero(unknowns_);
+      const VectorXd turned = within * forces.eigenvectors().col(k);
       for (Index a = 0; a < n; ++a) {
         const Index i = live[static_cast<std::size_t>(a)];
-        direction[i] = eigen.eigenvectors()(a, k) / unit[i];
+        direction[i] = turned[a] / unit[i];
       }
       free.push_back(direction / direction.norm());
+      if (!undetermined(forces.eigenvalues()[k])) confounded.push_back(free.back());
     }
   }
-  fit_.free.resize(unknowns_, static_cast<Index>(free.size()));
-  for (std::size_t k = 0; k < free.size(); ++k) fit_.free.col(static_cast<Index>(k)) = free[k];
+  const auto columns = [&](const std::vector<VectorXd>& list) {
+    MatrixXd all(unknowns_, static_cast<Index>(list.size()));
+    for (std::size_t k = 0; k < list.size(); ++k) all.col(static_cast<Index>(k)) = list[k];
+    return all;
+  };
+  fit_.free = columns(free);
+  fit_.confounded = columns(confounded);
 }
 
 void Balance::intervals() {

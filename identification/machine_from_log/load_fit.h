@@ -40,7 +40,10 @@ struct LoadFit {
   std::vector<FrictionState> friction;  ///< by cylinder
   std::vector<bool> used;               ///< by cylinder: its rows took part
   Eigen::VectorXd masses;               ///< by unknown, one of the solutions
-  Eigen::MatrixXd free;  ///< [unknowns x directions] that change no force of these rows
+  Eigen::MatrixXd
+      free;  ///< [unknowns x directions] that change no force of these rows beside all else
+  /// [unknowns x directions] those of `free` that have a force, which an offset, friction or an area takes up.
+  Eigen::MatrixXd confounded;
   /// Of the masses: squares of half widths, as Intervals::squared.
   std::vector<Eigen::MatrixXd> squared_half;
   double half_of(const Eigen::VectorXd& weights) const;  ///< of a sum of masses

@@ -57,7 +57,7 @@ std::vector<Index> balanced_rows(const Machine& machine, int cylinder, const Ske
         const int j = machine.cylinders[static_cast<std::size_t>(i)].joint;
         const Taylor3 x = linkage_rates(machine, i, rows.q(k, j));
         steady = steady && std::isfinite(x.d1) && x.d1 != 0.0;
-        if (i == cylinder) steady = steady && std::abs(x.d1 * rows.qd(k, j)) > options.moving;
+        if (i == cylinder) steady = steady && std::abs(x.d1 * rows.qd_least(k, j)) > options.moving;
       }
       if (steady) kept.push_back(k);
     } catch (const std::domain_error&) {

@@ -107,9 +107,11 @@ std::string name_of(const Machine& machine, const MassUnknown& u) {
 }
 
 /// Base parameters: each unknown that the rows determine together with multiples of those that they leave free.
-void name_combinations(const Machine& machine, const std::vector<MassUnknown>& unknowns,
-                       const std::vector<LoadRows>& loads, const LoadFit& fit,
-                       RealisedMasses& out) {
+/// @return by link: whether one of its unknowns is determined so
+std::vector<bool> name_combinations(const Machine& machine,
+                                    const std::vector<MassUnknown>& unknowns,
+                                    const std::vector<LoadRows>& loads, const LoadFit& fit,
+                                    RealisedMasses& out) {
   const Index n = fit.masses.size(), free = fit.free.cols();
   // Which unknowns are expressed by the others: masses first, which are what the convention chooses.
   MatrixXd basis = fit.free;
@@ -145,8 +147,10 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
     square.row(k) = fit.free.row(dependent[static_cast<std::size_t>(k)]);
   Index rows = 0;
   for (std::size_t i = 0; i < loads.size(); ++i) rows += fit.used[i] ? loads[i].rows() : 0;
+  std::vector<bool> told(machine.links.size(), false);
   for (Index u = 0; u < n; ++u) {
     if (taken[static_cast<std::size_t>(u)]) continue;
+    told[static_cast<std::size_t>(unknowns[static_cast<std::size_t>(u)].link)] = true;
     VectorXd weights = VectorXd::Unit(n, u);
     std::string name = name_of(machine, unknowns[static_cast<std::size_t>(u)]);
     if (d > 0) {
@@ -170,6 +174,16 @@ void name_combinations(const Machine& machine, const std::vector<MassUnknown>& u
                                 fmt::format("pressures and static forces, {} rows", rows), "",
                                 std::move(terms)});
   }
+  return told;
+}
+
+/// Names of the cylinders whose rows took part.
+std::string used_cylinders(const Machine& machine, const LoadFit& fit) {
+  std::string used;
+  for (std::size_t i = 0; i < fit.used.size(); ++i) {
+    if (fit.used[i]) used += (used.empty() ? "" : ", ") + machine.cylinders[i].name;
+  }
+  return used;
 }
 
 /// Asks for links on which no row depends.
@@ -178,10 +192,7 @@ void ask_for_idle_links(const Known& known, const std::vector<LoadRows>& loads, 
   const MachineSketch& sketch = known.sketch;
   const Machine& machine = known.machine;
   const std::vector<Indices> links = indices_of(machine, mass_unknowns(sketch));
-  std::string used;
-  for (std::size_t i = 0; i < loads.size(); ++i) {
-    if (fit.used[i]) used += (used.empty() ? "" : ", ") + machine.cylinders[i].name;
-  }
+  const std::string used = used_cylinders(machine, fit);
   for (std::size_t l = 0; l < links.size(); ++l) {
     if (links[l].mass < 0 && links[l].moment < 0) continue;
     double effect = 0.0;
@@ -221,11 +232,39 @@ std::string cylinders_changed(const Known& known, const std::vector<LoadRows>& l
   return names;
 }
 
-/// Asks for every open link where the logs do not tell masses from an offset and friction.
-void ask_for_doubtful_links(const Known& known, const std::string& cylinders, RealisedMasses& out) {
+/// By link: whether it takes part in a direction that has a force which an offset, friction or an area takes up.
+std::vector<bool> confounded_links(const Known& known, const std::vector<LoadRows>& loads,
+                                   const LoadFit& fit) {
+  const std::vector<MassUnknown> unknowns = mass_unknowns(known.sketch);
+  std::vector<bool> taking(known.machine.links.size(), false);
+  for (Index d = 0; d < fit.confounded.cols(); ++d) {
+    std::vector<double> force(taking.size(), 0.0);
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+      if (!fit.used[i] || loads[i].rows() == 0) continue;
+      for (std::size_t l = 0; l < taking.size(); ++l) {
+        VectorXd own = VectorXd::Zero(fit.masses.size());
+        for (Index u = 0; u < own.size(); ++u) {
+          if (unknowns[static_cast<std::size_t>(u)].link == static_cast<int>(l))
+            own[u] = fit.confounded(u, d);
+        }
+        force[l] += (loads[i].masses * own).squaredNorm();
+      }
+    }
+    const double largest = *std::max_element(force.begin(), force.end());
+    for (std::size_t l = 0; l < taking.size(); ++l) {
+      if (std::sqrt(force[l]) > known.options.undetermined * std::sqrt(largest)) taking[l] = true;
+    }
+  }
+  return taking;
+}
+
+/// Asks for open links where the logs do not tell masses from an offset and friction.
+void ask_for_doubtful_links(const Known& known, const std::vector<bool>& links,
+                            const std::string& cylinders, RealisedMasses& out) {
   for (const OpenValue& v : known.sketch.open) {
     const bool centre = v.kind == OpenKind::kCog && !known.sketch.is_open(OpenKind::kMass, v.part);
-    if (v.kind != OpenKind::kMass && !centre) continue;
+    if ((v.kind != OpenKind::kMass && !centre) || !links[static_cast<std::size_t>(v.part)])
+      continue;
     out.questions.push_back(
         {v.path,
          fmt::format("in these logs what it weighs on {} looks like an offset of the pressures and "
@@ -270,9 +309,17 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
            "open (and check signs, units and the payload)"});
     }
   }
-  const std::string changed = cylinders_changed(known, loads, fit, masses - fit.masses);
+  const std::vector<bool> told = name_combinations(machine, unknowns, loads, fit, out);
+  std::string changed = cylinders_changed(known, loads, fit, masses - fit.masses);
+  std::vector<bool> doubtful(machine.links.size(), true);
+  if (changed.empty()) {  // a link of which nothing at all is determined is as doubtful
+    doubtful = confounded_links(known, loads, fit);
+    for (std::size_t l = 0; l < told.size(); ++l) doubtful[l] = doubtful[l] && !told[l];
+    if (std::find(doubtful.begin(), doubtful.end(), true) != doubtful.end())
+      changed = used_cylinders(machine, fit);
+  }
   if (!changed.empty() && out.questions.empty()) {
-    ask_for_doubtful_links(known, changed, out);
+    ask_for_doubtful_links(known, doubtful, changed, out);
     masses = fit.masses;
     found = false;
   }
@@ -287,7 +334,6 @@ RealisedMasses realise_masses(const Known& known, const std::vector<LoadRows>& l
         unknowns.size() - static_cast<std::size_t>(fit.free.cols()), unknowns.size(),
         100.0 * used));
   }
-  name_combinations(machine, unknowns, loads, fit, out);
   out.possible = found;
   out.solution = masses;
   out.links.resize(machine.links.size());

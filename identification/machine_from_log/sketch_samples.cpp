@@ -27,6 +27,24 @@ double white_noise(const Log& log, const VectorXd& values) {
          kThirdDifferenceNoise;
 }
 
+/// Of each sample the rate in its window that is smallest in size; 0 where the window has both directions or leaves its run.
+VectorXd least_rates(const Log& log, const VectorXd& rate, double window) {
+  VectorXd least = VectorXd::Zero(rate.size());
+  for (const SampleRange& run : log.runs) {
+    Index first = run.begin, end = run.begin;
+    for (Index k = run.begin; k < run.end; ++k) {
+      const double from = log.time[k] - 0.5 * window, to = log.time[k] + 0.5 * window;
+      while (log.time[first] < from) ++first;
+      while (end < run.end && log.time[end] <= to) ++end;
+      if (log.time[run.begin] > from || log.time[run.end - 1] < to) continue;
+      const double lo = rate.segment(first, end - first).minCoeff();
+      const double hi = rate.segment(first, end - first).maxCoeff();
+      least[k] = lo > 0.0 ? lo : hi < 0.0 ? hi : 0.0;
+    }
+  }
+  return least;
+}
+
 /// The rows of one log that are kept: every `stride`-th.
 struct Picker {
   const Log& log;
@@ -60,6 +78,7 @@ void put_cylinder(const Picker& pick, const SavitzkyGolay& filter, int index, Cy
     quieten_acceleration(pick.log.time, pick.log.runs, stroke->values, filter, smooth.second);
     put(pick, smooth.value, c.stroke_value);
     put(pick, smooth.first, c.stroke_rate);
+    put(pick, least_rates(pick.log, smooth.first, filter.window()), c.stroke_rate_least);
     put(pick, smooth.second, c.stroke_bend);
     c.stroke_noise = std::max(c.stroke_noise, white_noise(pick.log, stroke->values));
   }
@@ -101,6 +120,8 @@ void put_log(const Machine& machine, const Picker& pick, const MachineFromLogOpt
     out.q.col(j).segment(at, n) = pick.picked(smooth.value);
     out.qd.col(j).segment(at, n) = pick.picked(smooth.first);
     out.qdd.col(j).segment(at, n) = pick.picked(smooth.second);
+    out.qd_least.col(j).segment(at, n) =
+        pick.picked(least_rates(log, smooth.first, filter.window()));
     const double noise = white_noise(log, channel->values);
     out.position_noise[j] = std::max(out.position_noise[j], noise);
     out.rate_noise[j] = std::max(out.rate_noise[j], noise * filter.noise_gain(1));
@@ -137,7 +158,8 @@ SketchRows sketch_rows(const Machine& machine, const std::vector<Log>& logs,
   for (const Log* log : all) rows += Picker{*log, stride, 0, 0}.count();
   const Index joints = machine.joint_count();
   out.time = VectorXd::Zero(rows);
-  out.position = out.q = out.qd = out.qdd = Eigen::MatrixXd::Constant(rows, joints, kNaN);
+  out.position = out.q = out.qd = out.qdd = out.qd_least =
+      Eigen::MatrixXd::Constant(rows, joints, kNaN);
   out.position_noise = out.rate_noise = VectorXd::Zero(joints);
   out.payload = VectorXd::Zero(rows);
   out.block = out.log = Eigen::VectorXi::Zero(rows);
@@ -166,6 +188,7 @@ bool positions_from_strokes(const Machine& machine, int joint, SketchRows& rows)
         const Taylor3 x = linkage_rates(machine, cylinder, q[k]);
         rows.q(k, joint) = q[k];
         rows.qd(k, joint) = c.stroke_rate[k] / x.d1;
+        rows.qd_least(k, joint) = c.stroke_rate_least[k] / x.d1;
         rows.qdd(k, joint) =
             (c.stroke_bend[k] - x.d2 * rows.qd(k, joint) * rows.qd(k, joint)) / x.d1;
       }

@@ -12,6 +12,7 @@ using Mask = Eigen::Array<bool, Eigen::Dynamic, 1>;
 struct CylinderRows {
   Eigen::VectorXd stroke;                                  ///< [m] as logged
   Eigen::VectorXd stroke_value, stroke_rate, stroke_bend;  ///< smoothed [m], [m/s], [m/s^2]
+  Eigen::VectorXd stroke_rate_least;                       ///< [m/s] as qd_least
   double stroke_noise = 0.0;                               ///< [m] standard deviation, raw
   Eigen::VectorXd pressure_a, pressure_b;                  ///< [Pa] smoothed
   Eigen::VectorXd force;                                   ///< [N] smoothed, a load cell's
@@ -24,6 +25,9 @@ struct SketchRows {
   std::vector<std::string> files;  ///< of the logs, then of the test logs
   Eigen::MatrixXd position;        ///< [rows x joints] as logged, NaN where a log has none
   Eigen::MatrixXd q, qd, qdd;      ///< [rows x joints] smoothed
+  /// Rate of the slowest sample in the window of the filter around a row; 0 where the window has both directions or does not
+  /// lie within a run. A smoothed pressure mixes what is measured in its window: beside a rest it is no sliding friction.
+  Eigen::MatrixXd qd_least;
   Eigen::VectorXd position_noise;  ///< [joints] standard deviation, raw
   Eigen::VectorXd rate_noise;      ///< [joints] of qd
   Eigen::VectorXd payload;         ///< [kg]; 0 where not logged

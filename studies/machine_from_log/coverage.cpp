@@ -121,6 +121,7 @@ struct Case {
   const Laws& laws;
   std::uint64_t seed;
   double seconds;
+  double noise;  ///< of the sensors, relative to the usual
 };
 
 simulator::LogRequest request_of(const Case& c, const Machine& truth) {
@@ -128,6 +129,7 @@ simulator::LogRequest request_of(const Case& c, const Machine& truth) {
   request.machine = truth;
   request.crane_seed = request.motion_seed = c.seed;
   request.seconds = c.seconds;
+  request.noise_factor = c.noise;
   for (const std::string& id : c.laws.of_machine) request.effects.push_back({id, "", 1.0});
   for (const std::string& id : c.laws.of_cylinders) {
     const std::vector<std::string> places = simulator::places_of(id, truth);
@@ -188,14 +190,17 @@ int run(int argc, char** argv) {
   MachineFromLogOptions options;
   int seeds = 20;
   std::uint64_t first = 1;
-  double seconds = 240.0;
+  double seconds = 240.0, noise = 1.0;
   bool verbose = false;
   std::vector<std::string> machines = {"loader_crane", "excavator", "swing_crane"}, own;
   app.add("--seeds", seeds, "logs of each machine and set of laws");
   app.add("--seed", first, "first random seed");
   app.add("--seconds", seconds, "duration of a log [s]");
+  app.add("--noise", noise, "noise of the sensors, relative to the usual");
   app.add("--machines", machines, "bundled machines");
   app.add("--model-error", options.model_error, "standard deviation of forces of unknown forms");
+  app.add("--moving", options.moving, "speed from which a rod counts as moving [m/s]");
+  app.add("--steady", options.steady, "share of the acceleration's limit up to which a row counts");
   app.add("--laws", own, "effects of every cylinder in place of the sets of the table");
   app.flag("-v,--verbose", verbose, "print every value");
   if (const auto code = app.parse(argc, argv)) return *code;
@@ -209,8 +214,8 @@ int run(int argc, char** argv) {
     for (const Blanked& blanked : blanked_machines()) {
       if (std::find(machines.begin(), machines.end(), blanked.machine) == machines.end()) continue;
       for (int k = 0; k < seeds; ++k)
-        judge({blanked, laws, first + static_cast<std::uint64_t>(k), seconds}, options, verbose,
-              scores);
+        judge({blanked, laws, first + static_cast<std::uint64_t>(k), seconds, noise}, options,
+              verbose, scores);
     }
     fmt::print("| {} | {} | {} | {} | {} |\n", laws.name, cell(scores["bores"]),
                cell(scores["rods"]), cell(scores["masses"]), scores["asked"].values);

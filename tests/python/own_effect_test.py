@@ -34,6 +34,25 @@ def test_the_formula_is_the_function():
                         "(1.0 - abs(sin(q.boom)))) * 1.5)")
 
 
+def test_tables_and_cases_of_numpy_become_formulas(machine):
+    """The formula, worked out by Python, has NumPy's values; the program takes its units and its parameter."""
+    speeds, forces = [-0.3, -0.05, 0.0, 0.1, 0.4], [2.0, 1.0, 0.0, 1.5, 1.8]
+
+    def law(s, p):
+        ratio = s.v / sparflow.quantity(1, "m/s") if isinstance(s.v, sparflow.Formula) else s.v
+        return p.Fc * (np.interp(ratio, speeds, forces) + np.where(ratio > 0.2, 3.0, 0.5) + np.clip(ratio, -0.1, 0.2))
+
+    keys = dict(Fc=dict(unit="N", bounds=[0, 20000], typical=3000))
+    made = sparflow.effect(stage="force", parameters=keys, id="table")(law)
+    v = np.linspace(-0.5, 0.6, 111) + 1e-4  # not at kinks
+    text = made.law.replace("[m/s]", "").replace("^", "**")
+    words = dict(positive=lambda x: np.maximum(x, 0), step=lambda x: np.asarray(x, float), max=np.maximum, min=np.minimum)
+    by_formula = eval(text, words, dict(v=v, Fc=7.0))
+    assert np.allclose(by_formula, law(types.SimpleNamespace(v=v), types.SimpleNamespace(Fc=7.0)), rtol=0, atol=1e-12)
+    better = sparflow.fit(machine, TRAIN, effects=made)  # units and linear parameter are accepted
+    assert better.model is not None
+
+
 def test_diagnosis_names_it_and_finds_what_the_yaml_text_finds(machine, tmp_path):
     off = sparflow.fit(machine, TRAIN).model
     ours = sparflow.diagnose(off, TRAIN, test=TEST, candidates=["python_friction"], effects=python_friction).to_dict()
@@ -57,6 +76,8 @@ def test_what_is_no_formula_is_refused(machine):
     refused("cannot branch", lambda s, p: p.Fc if s.v > 0 else -p.Fc)
     refused("not those of `math`", lambda s, p: p.Fc * math.tanh(s.v / p.v0))
     refused("no arctan", lambda s, p: p.Fc * np.arctan(s.v / p.v0))
+    refused("no convolve; it has interp", lambda s, p: p.Fc * np.convolve(s.v, [1, 2]))
+    refused("xp that increases", lambda s, p: p.Fc * np.interp(s.v / p.v0, [1, 0], [0, 1]))
     refused("no parameter Fd", lambda s, p: p.Fd)
     wrong = sparflow.effect(stage="force", parameters=PARAMETERS, id="wrong_unit")(lambda s, p: p.Fc * s.v / p.v0**2)
     with pytest.raises(sparflow.InputError, match=r"own_effect_test.py, <lambda>\(\) in line \d+.*the unit of stage force"):

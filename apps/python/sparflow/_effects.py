@@ -10,7 +10,8 @@ from ._errors import UsageError
 
 
 class Formula:
-    """A formula in signals and parameters: + - * / **, comparisons inside step(), NumPy's functions of one value."""
+    """A formula in signals and parameters: + - * / **, comparisons inside step(), NumPy's functions of one value, np.where,
+    np.clip, and np.interp over a table of numbers."""
 
     __array_priority__ = 1000  # before NumPy's arrays, which are no formulas
 
@@ -53,10 +54,18 @@ class Formula:
             raise UsageError(f"a formula has no {ufunc.__name__}; it has {', '.join(sorted(_FUNCTIONS))}")
         return _called(name, *inputs)
 
+    def __array_function__(self, function, types, args, options):
+        made = {"interp": _table, "clip": _clipped, "where": _chosen}.get(function.__name__)
+        if made is None:
+            raise UsageError(f"a formula has no {function.__name__}; it has interp, clip, where, {', '.join(sorted(_FUNCTIONS))}")
+        return made(*args, **options)
+
 
 class _Comparison:
     def __init__(self, left, mark, right):
         self.text = f"{_text(left)} {mark} {_text(right)}"
+
+    __array_function__ = Formula.__array_function__
 
     def __bool__(self):
         return Formula.__bool__(self)
@@ -81,6 +90,30 @@ def _joined(left, mark, right):
 
 def _called(name, *values):
     return Formula(f"{name}({', '.join(_text(v) for v in values)})")
+
+
+def _table(x, xp, fp):
+    """np.interp over fixed numbers: a sum of kinks; `x` has no unit."""
+    try:
+        xp, fp = [float(v) for v in xp], [float(v) for v in fp]
+    except TypeError:
+        raise UsageError("np.interp in an effect needs a list of numbers for xp and for fp") from None
+    if len(xp) != len(fp) or len(xp) < 2 or any(b <= a for a, b in zip(xp, xp[1:])):
+        raise UsageError("np.interp in an effect needs xp that increases and as many values in fp, two at least")
+    slopes = [0.0, *((d - c) / (b - a) for a, b, c, d in zip(xp, xp[1:], fp, fp[1:])), 0.0]
+    value = Formula(_text(fp[0]))
+    for at, before, behind in zip(xp, slopes, slopes[1:]):
+        if behind != before:
+            value = value + (behind - before) * positive(x - at)
+    return value
+
+
+def _clipped(x, lowest, highest):
+    return _called("min", _called("max", x, lowest), highest)
+
+
+def _chosen(condition, there, elsewhere):
+    return step(condition) * there + (1 - step(condition)) * elsewhere
 
 
 def step(condition):

@@ -43,6 +43,16 @@ def fit_frame(self):
     return _pandas().DataFrame(to_dict(self)["processes"])
 
 
+def mapping_frame(self):
+    """The machine's signals, a row each: meaning, column, channel, confidence, sure, reasons, other, ..."""
+    return _pandas().DataFrame(to_dict(self)["proposal"]["meanings"])
+
+
+def channels_frame(self):
+    """The channels of the log, a row each: name, unit, rate_Hz, smallest, largest, gaps, missing_share, noise, ..."""
+    return _pandas().DataFrame(to_dict(self)["channels"])
+
+
 def diagnosis_frame(self):
     """The effects that passed their proofs, most probable first: id, at, stage, probability, parameters, ..."""
     return _pandas().DataFrame(to_dict(self)["effects"])
@@ -165,6 +175,8 @@ def attach():
     core.Result.to_dict = to_dict
     core.FitResult.to_frame = fit_frame
     core.CompareResult.to_frame = compare_frame
+    core.MappingProposal.to_frame = mapping_frame
+    core.MappingProposal.channels = channels_frame
     core.Diagnosis.to_frame = diagnosis_frame
     core.ExtendResult.to_frame = extend_frame
     core.Selftest.to_frame = selftest_frame

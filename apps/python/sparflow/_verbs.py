@@ -7,6 +7,19 @@ from . import _sparflow as core
 from ._errors import UsageError
 
 
+def propose_mapping(path, machine, *, mapping=None, dbc=(), progress=None):
+    """Lists the channels of a log and proposes which of the machine's signals each is; returns a MappingProposal.
+
+    path: a log of any format. machine: a Machine or the path of its file. mapping: path of a mapping file to read it by.
+    dbc: path of a database that decodes its CAN frames, or several.
+    Nothing uses the proposal unasked: `.save(path)` writes what is sure as a mapping file (docs/mapping_proposal.md).
+    progress: called as progress(share, words) in this thread. Raises InputError.
+    """
+    dbc = [dbc] if isinstance(dbc, (str, os.PathLike)) else list(dbc)
+    return core.propose_mapping(path, _inputs.one("propose_mapping", machine, core.Machine), dict(
+        mapping="" if mapping is None else os.fspath(mapping), dbc=[os.fspath(d) for d in dbc], progress=progress))
+
+
 def fit(machine, logs, test=None, *, mapping=None, threads=0, effects=None, progress=None):
     """Identifies pressure models, margins, standby and valve gains from logs; returns a FitResult.
 

@@ -2,12 +2,19 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "identification/mapping_proposal/channel_words.h"
 #include "models/files/model_file.h"
 
 namespace sparflow {
 namespace {
+
+/// A number, or null where there is none.
+nlohmann::json finite_json(double value) {
+  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
+}
 
 Table meanings_table(const MappingProposal& p, const Machine& machine, bool sure) {
   Table table;
@@ -107,6 +114,48 @@ std::string proposal_json(const MappingProposal& p, const Machine& machine) {
     out["meanings"].push_back(std::move(row));
   }
   return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::vector<ChannelSummary> summaries(const TimedChannels& file) {
+  std::vector<ChannelSummary> channels;
+  channels.reserve(file.recording.channels.size());
+  for (const RecordedChannel& channel : file.recording.channels) {
+    channels.push_back(summarise(channel));
+    ChannelSummary& summary = channels.back();
+    if (summary.unit.empty()) summary.unit = channel_unit(channel.name, "").word;
+  }
+  return channels;
+}
+
+std::string channels_json(const TimedChannels& file, const std::vector<ChannelSummary>& channels,
+                          const std::vector<std::string>& guesses, const std::string& proposal) {
+  nlohmann::json out = {{"file", file.recording.file},
+                        {"format", file.recording.format},
+                        {"clock", file.clock_reason},
+                        {"warnings", file.recording.warnings},
+                        {"channels", nlohmann::json::array()}};
+  for (const ChannelSummary& c : channels) {
+    out["channels"].push_back({{"name", c.name},
+                               {"unit", c.unit},
+                               {"group", c.group},
+                               {"comment", c.comment},
+                               {"samples", c.samples},
+                               {"duration_s", finite_json(c.duration)},
+                               {"rate_Hz", finite_json(c.rate)},
+                               {"missing_share", finite_json(c.missing_share)},
+                               {"gaps", c.gaps},
+                               {"longest_gap_s", finite_json(c.longest_gap)},
+                               {"longest_gap_at_s", finite_json(c.longest_gap_at)},
+                               {"smallest", finite_json(c.smallest)},
+                               {"largest", finite_json(c.largest)},
+                               {"mean", finite_json(c.mean)},
+                               {"resolution", finite_json(c.resolution)},
+                               {"noise", finite_json(c.noise)},
+                               {"constant", c.constant}});
+  }
+  for (std::size_t k = 0; k < guesses.size(); ++k) out["channels"][k]["guess"] = guesses[k];
+  if (!proposal.empty()) out["proposal"] = nlohmann::json::parse(proposal);
+  return out.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace sparflow

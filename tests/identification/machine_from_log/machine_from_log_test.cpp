@@ -201,6 +201,18 @@ TEST(MachineFromLogs, AWeightThatLooksLikeAnOffsetIsAskedFor) {
   EXPECT_THAT(found.questions.front().sentence, HasSubstr("looks like an offset"));
 }
 
+TEST(MachineFromLogs, MassesThatLookLikeOffsetsAreAskedForByNameAlsoWhereTheirCentresAreOpen) {
+  // Straight axes: no load changes but by the payload, so that any masses would do beside offsets of the pressures.
+  const std::string text =
+      blanked("three_axis", {{"mass: 500, cog: [0, 0, 0]", "mass: unknown, cog: unknown"},
+                             {"mass: 400, cog: [0, 0, 0]", "mass: unknown, cog: unknown"}});
+  const Machine truth = load_machine(machine_path("three_axis"));
+  const MachineFromLog found = found_from(text, truth, {});
+  EXPECT_FALSE(found.complete()) << machine_from_log_table(found);
+  EXPECT_THAT(question_paths(found), Contains("links[lift_body].mass"));
+  EXPECT_THAT(question_paths(found), Contains("links[reach_body].mass"));
+}
+
 TEST(MachineFromLogs, ExcavatorsKnuckleLengthAndPinsComeBack) {
   const Machine truth = load_machine(machine_path("excavator"));
   const std::string text =
