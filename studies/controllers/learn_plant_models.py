@@ -1,10 +1,11 @@
-"""Learns the models of the plant that the scenarios name from several kinds of work on the same machine.
+"""Learns models of the plant from several kinds of work on the same machine.
 
     python3 studies/controllers/learn_plant_models.py build FOLDER [MACHINE...]
 
 First a model is learned from 400 s of a simulated operator. By it the optima of scenarios drawn from seed 3, which are neither tuning
 nor test scenarios, are planned; these are tracked, and the same scenarios are driven by joint PI and both operators. The model is then
-learned from the operator's log and all these, with the valves' dead bands. problems/models/README.md has the result.
+learned from the operator's log and all these, with the valves' dead bands. docs/benchmark.md tells what that changed; the bundled
+models know the operator's log alone.
 """
 import pathlib
 import re
