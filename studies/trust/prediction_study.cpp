@@ -1,7 +1,7 @@
 // Where the difference between the energy that a model predicts of its optima and the true energy of tracking them comes
 // from, scenario by scenario, with any gains of the tracker. docs/benchmark.md.
 //   prediction_study SCENARIO.yaml... [--model MODEL.json] [--controller NAME] [--gains 1.4:0.1:0.2,...] [--sway DEG] [--quiet]
-//       [--ramp S] [--smoothing S] [--plans FOLDER] [--trace FOLDER]
+//       [--ramp S] [--smoothing S] [--plans FOLDER] [--trace FOLDER] [--logs FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -22,6 +22,7 @@
 #include "simulator/benchmark/scenario_file.h"
 #include "simulator/controllers/joint_tracker.h"
 #include "simulator/controllers/registry.h"
+#include "simulator/sensors/log_writer.h"
 
 namespace sparflow::bench {
 namespace {
@@ -29,7 +30,7 @@ namespace {
 struct Arguments {
   std::vector<std::string> scenarios, gains;
   std::string model, controller = "tracked_optimum";
-  std::string plans, trace;  // folders; empty: none
+  std::string plans, trace, logs;  // folders; empty: none
   double sway = 0.0, ramp = OptimalMotionOptions{}.ramp,
          smoothing = OptimalMotionOptions{}.smoothing;
   bool quiet = false;
@@ -255,6 +256,15 @@ void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
   }
 }
 
+/// The run as sensors tell it, for `sparflow fit`.
+void write_log(const std::string& folder, const Planned& p, const Driven& d) {
+  std::filesystem::create_directories(folder);
+  plant::LogWriter log(p.scenario.machine, p.scenario.plant, p.scenario.seeds.front(),
+                       "prediction_study: " + p.scenario.id);
+  for (const plant::Record& r : d.records) log.add(r);
+  std::ofstream(std::filesystem::path(folder) / (p.scenario.id + ".csv")) << log.text("");
+}
+
 std::vector<Planned> planned(const Arguments& a, const OptimalMotionOptions& planning) {
   std::vector<Planned> all;
   all.reserve(a.scenarios.size());
@@ -288,6 +298,7 @@ void run_all(const std::vector<Planned>& all, const std::string& gains, const Ar
         a.controller, [&](const control::Knowledge& know) { return info.make(know, values); },
         p.scenario.seeds.front(), loop);
     if (!a.trace.empty()) write_trace(a.trace, p, d);
+    if (!a.logs.empty()) write_log(a.logs, p, d);
     const Split x = split_of(d, p);
     if (!a.quiet) tell_row(p.scenario.id, x, row);
     sums.add(x, row, p.scenario.goals.front().duration);
@@ -327,6 +338,7 @@ int run_with(int argc, char** argv) {
   app.add("--sway", a.sway, "limit of the planned payload's angle [deg], 0: none").range(0.0, 45.0);
   app.add("--plans", a.plans, "folder in which the optima are kept for the next run");
   app.add("--trace", a.trace, "folder for a CSV of each run");
+  app.add("--logs", a.logs, "folder for a log of each run, as sensors tell it");
   app.flag("--quiet", a.quiet, "only the medians");
   if (const auto code = app.parse(argc, argv)) return *code;
   return run(a);

@@ -85,7 +85,8 @@ const char* const kScenario =
 
 TEST_F(StudyPrograms, PredictionStudyTellsTheEnergiesOfTheBenchmark) {
   std::ofstream(at("short.yaml")) << kScenario;
-  const std::string table = printed("bench/prediction_study " + at("short.yaml"));
+  const std::string table =
+      printed("bench/prediction_study " + at("short.yaml") + " --logs " + at("logs"));
   printed("sparflow benchmark " + at("short.yaml") +
           " --controllers tracked_optimum --no-bound --json " + at("result.json"));
   const auto result = nlohmann::json::parse(read_file(at("result.json")));
@@ -103,6 +104,12 @@ TEST_F(StudyPrograms, PredictionStudyTellsTheEnergiesOfTheBenchmark) {
   EXPECT_NEAR(v[11], 1e3 * row["tip_error_path_m"].get<double>(), 0.51);
   // the parts: true - predicted = tracking + flow + pressure, but for what a sample of 20 ms leaves out
   EXPECT_NEAR(v[1] - v[0], v[3] + v[5] + v[6], 0.01 * v[1]);
+
+  // the log is one that the program reads: as long as the run, with the pump's pressure
+  const std::string log = printed("sparflow log " + at("logs/short.csv"));
+  EXPECT_NE(log.find("p_main_bar"), std::string::npos) << log;
+  const std::string rows = read_file(at("logs/short.csv"));
+  EXPECT_GT(std::count(rows.begin(), rows.end(), '\n'), 12 * 50);  // of 12 s, 50 a second
 
   // the last line is of this one run
   const std::vector<double> sum = numbers(line_of(table, "gains "));
