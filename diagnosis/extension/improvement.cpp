@@ -140,7 +140,11 @@ std::optional<Improvement::Exchange> Improvement::best_exchange(
             effect_key(e.effect->info(), context_.machine(), e.at),
             effect_key(rival.effect->info(), context_.machine(), rival.at), change.own,
             change.overall, change.overall_deviation);
-      if (change.own * options.refit_moves < 1.0 && (!best || change.own < best->own)) best = tried;
+      const bool beyond_chance =
+          std::log(change.overall) < -options.standard_errors * change.overall_deviation;
+      if (beyond_chance && change.own * options.refit_moves < 1.0 &&
+          (!best || change.own < best->own))
+        best = tried;
     }
   }
   return best;
