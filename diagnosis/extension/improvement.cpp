@@ -54,12 +54,6 @@ std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const Ef
   return out;
 }
 
-/// Whether an effect acts on pressures alone, beside what is learned.
-bool acts_on_learned_laws(const EffectAt& e) {
-  const EffectStage stage = e.effect->info().stage;
-  return stage == EffectStage::kPressure || stage == EffectStage::kPump;
-}
-
 std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
   std::erase(list, e);
   return list;
@@ -204,8 +198,6 @@ Improvement::Joint Improvement::joint(const Trial& trial, const SearchProgress& 
   j.judged = context_.with(current_, trial.effects, progress);
   j.all = places_of(j.judged.model.effects);
   j.measured = context_.cross_validated(j.judged.model, j.all, progress);
-  if (std::any_of(j.all.begin(), j.all.end(), acts_on_learned_laws))
-    j.of_all = context_.errors_of_all(j.measured);
   j.on_tests = context_.tested_errors(j.judged.model, j.all, progress);
   return j;
 }
@@ -215,32 +207,32 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   const ExtendOptions& options = context_.options();
   const CraneModel& model = joint.judged.model;
   const std::vector<EffectAt> rest = without(joint.all, e);
-  const bool learned = acts_on_learned_laws(e);
+  const EffectStage stage = e.effect->info().stage;
+  const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
   Tested tested;
   ExtendStep& step = tested.step;
   step.added = effect_key(e.effect->info(), model.machine, e.at);
   step.title = effect_title(e.effect->info(), model.machine, e.at);
   step.effect = model.effects[static_cast<std::size_t>(
       std::find(joint.all.begin(), joint.all.end(), e) - joint.all.begin())];
-  const CrossValidated left = context_.cross_validated(joint.measured, rest, {e}, progress);
-  judge_step(context_, e, learned ? context_.errors_of_all(left) : left.errors,
-             learned ? *joint.of_all : joint.measured.errors, step);
-  step.judged_on = context_.measured_on();
+  if (learned) {
+    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
+               step);
+  } else {
+    judge_step(context_, e, context_.cross_validated(joint.measured, rest, {e}, progress).errors,
+               joint.measured.errors, step);
+    step.judged_on = context_.measured_on();
+  }
   step.determined = is_determined(step.effect);
   const double change = std::min(step.change.own, step.change.own_steady);
   const bool falls = change * options.change.refit_moves < 1.0;
   // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
   const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
   tested.stays = step.determined && (falls || unseen);
-  if (!tested.stays || !joint.on_tests) return tested;
+  if (!tested.stays || !joint.on_tests || learned) return tested;
   // Test logs do not choose an effect, but may contradict it.
   ExtendStep test = step;
-  if (learned) {
-    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
-               test);
-  } else {
-    judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
-  }
+  judge_step(context_, e, *context_.tested_errors(model, rest, progress), *joint.on_tests, test);
   tested.stays = !harms_its_own_place(test, model.machine, e);
   if (!tested.stays) step = std::move(test);
   return tested;

@@ -87,8 +87,8 @@ class Improvement {
 
   Joint joint(const Trial& trial, const SearchProgress& progress) const;
 
-  /// The step that takes one effect out of a joint set, with the errors of a cross-validation: for effects on pressures
-  /// alone of everything, else of forces and flows. Test logs may contradict it.
+  /// The step that takes one effect out of a joint set. The errors of forces and flows are those of a cross-validation;
+  /// effects on pressures alone are judged as a step is.
   Tested without_one(const Joint& joint, const EffectAt& e, const SearchProgress& progress) const;
 
   /// Of the tested effects the one that the data bear out least, if they do not bear out all.

@@ -244,17 +244,6 @@ CrossValidated RefitContext::cross_validated(const CrossValidated& was,
   return out;
 }
 
-CompareResult RefitContext::errors_of_all(const CrossValidated& of) const {
-  if (!references_.empty()) return of.errors;
-  std::vector<CraneModel> models;
-  for (std::size_t f = 0; f < fold_count(); ++f) {
-    FitOptions how = options_.fit;
-    how.effects = of.models[f].effects;
-    models.push_back(fit_without(machine_, signals_, fold(f), how));
-  }
-  return errors_on_folds(models);
-}
-
 std::optional<CompareResult> RefitContext::tested_errors(const CraneModel& from,
                                                          const std::vector<EffectAt>& effects,
                                                          const SearchProgress& progress) const {

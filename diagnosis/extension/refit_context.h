@@ -62,8 +62,6 @@ class RefitContext {
   CrossValidated cross_validated(const CrossValidated& was, const std::vector<EffectAt>& effects,
                                  const std::vector<EffectAt>& changed,
                                  const SearchProgress& progress) const;
-  /// Errors of everything, pressures included, by the same cross-validation; all laws are learned for each fold.
-  CompareResult errors_of_all(const CrossValidated& of) const;
 
   /// Errors of forces and flows on the test logs, which may contradict an effect; without test logs empty.
   std::optional<CompareResult> tested_errors(const CraneModel& from,

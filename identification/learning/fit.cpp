@@ -187,11 +187,6 @@ CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<Machin
   return std::move(pass.model);
 }
 
-CraneModel fit_without(const Machine& machine, const std::vector<MachineSignals>& signals,
-                       const std::vector<Mask>& left_out, const FitOptions& options) {
-  return learn(machine, signals, inside_without(signals, left_out), options, {}).model;
-}
-
 namespace {
 
 /// Blocks of motion whose number, counted over all logs, is `which` modulo `every`.

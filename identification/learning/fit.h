@@ -106,11 +106,6 @@ FitResult fit(const Machine& machine, std::vector<Log>&& logs, std::vector<Log>&
 CraneModel fit_forces_and_flows(const Machine& machine, const std::vector<MachineSignals>& signals,
                                 const std::vector<Mask>& left_out, const FitOptions& options);
 
-/// A model of everything that the logs show, with the options' effects, learned without some samples.
-/// @param left_out [logs] masks of the samples that do not count; empty = none
-CraneModel fit_without(const Machine& machine, const std::vector<MachineSignals>& signals,
-                       const std::vector<Mask>& left_out, const FitOptions& options);
-
 /// @return [logs] masks of the samples held out for FitResult; all false when fewer than two blocks of motion
 ///   could be held out
 std::vector<Mask> held_out_samples(const std::vector<MachineSignals>& signals,

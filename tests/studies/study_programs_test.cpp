@@ -130,7 +130,7 @@ struct Counted {
 
 TEST_F(StudyPrograms, MachineCoverageCountsTheIntervalsThatHoldTheTruth) {
   const std::string table = printed(
-      "bench/machine_coverage --seeds 1 --seed 1 --seconds 80 --machines loader_crane --laws "
+      "bench/machine_coverage --seeds 1 --seed 1 --seconds 160 --machines loader_crane --laws "
       "coulomb_friction viscous_friction -v");
   const Machine truth =
       load_machine(std::string(SPARFLOW_SOURCE_DIR) + "/problems/machines/loader_crane.yaml");

@@ -62,18 +62,5 @@ TEST_F(CrossValidation, AChangeOfOneEffectGivesTheErrorsOfAWholeEstimate) {
             1.02 * error_of(both.errors, "force", "boom"));
 }
 
-TEST_F(CrossValidation, ErrorsOfEverythingHaveThePressuresThatAModelOfForcesAndFlowsLacks) {
-  const CraneModel model = fit(machine, logs.suspects).model;
-  const RefitContext context(model, logs, options);
-  const CrossValidated set = context.cross_validated(model, {effect("coulomb_friction:boom")}, {});
-  const CompareResult all = context.errors_of_all(set);
-  EXPECT_NEAR(error_of(all, "force", "boom"), error_of(set.errors, "force", "boom"),
-              1e-9 * error_of(all, "force", "boom"));
-  const CompareResult held = *fit(machine, logs.suspects, {}, options.fit).held_out;
-  // other motions of the same log: pressures are learned as well as by the ordinary held-out fit, but for the share of motions
-  EXPECT_LT(error_of(all, "pressure", "boom extend"),
-            2.0 * error_of(held, "pressure", "boom extend"));
-}
-
 }  // namespace
 }  // namespace sparflow
