@@ -1,6 +1,6 @@
 #pragma once
 /// The refit context: logs, options and held-out motions of one extension, on which models with other effects are
-/// learned and judged. Used by extend.cpp only.
+/// learned and judged. Used in diagnosis/extension only.
 #include <algorithm>
 #include <optional>
 #include <string>

@@ -2,19 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "identification/comparison/report_numbers.h"
 #include "identification/mapping_proposal/channel_words.h"
 #include "models/files/model_file.h"
 
 namespace sparflow {
 namespace {
-
-/// A number, or null where there is none.
-nlohmann::json finite_json(double value) {
-  return std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr);
-}
 
 Table meanings_table(const MappingProposal& p, const Machine& machine, bool sure) {
   Table table;
@@ -140,17 +135,17 @@ std::string channels_json(const TimedChannels& file, const std::vector<ChannelSu
                                {"group", c.group},
                                {"comment", c.comment},
                                {"samples", c.samples},
-                               {"duration_s", finite_json(c.duration)},
-                               {"rate_Hz", finite_json(c.rate)},
-                               {"missing_share", finite_json(c.missing_share)},
+                               {"duration_s", json_number(c.duration)},
+                               {"rate_Hz", json_number(c.rate)},
+                               {"missing_share", json_number(c.missing_share)},
                                {"gaps", c.gaps},
-                               {"longest_gap_s", finite_json(c.longest_gap)},
-                               {"longest_gap_at_s", finite_json(c.longest_gap_at)},
-                               {"smallest", finite_json(c.smallest)},
-                               {"largest", finite_json(c.largest)},
-                               {"mean", finite_json(c.mean)},
-                               {"resolution", finite_json(c.resolution)},
-                               {"noise", finite_json(c.noise)},
+                               {"longest_gap_s", json_number(c.longest_gap)},
+                               {"longest_gap_at_s", json_number(c.longest_gap_at)},
+                               {"smallest", json_number(c.smallest)},
+                               {"largest", json_number(c.largest)},
+                               {"mean", json_number(c.mean)},
+                               {"resolution", json_number(c.resolution)},
+                               {"noise", json_number(c.noise)},
                                {"constant", c.constant}});
   }
   for (std::size_t k = 0; k < guesses.size(); ++k) out["channels"][k]["guess"] = guesses[k];
