@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "diagnosis/selection/search_state.h"
 #include "identification/comparison/error_change.h"
@@ -52,6 +53,15 @@ std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const Ef
       out.push_back(c);
   }
   return out;
+}
+
+/// Whether the catalogue, which lists usual causes before unusual ones, has one effect before another.
+bool stands_before(const EffectAt& a, const EffectAt& b) {
+  for (const std::unique_ptr<Effect>& e : effect_catalogue()) {
+    if (e.get() == b.effect) return false;
+    if (e.get() == a.effect) return true;
+  }
+  return false;
 }
 
 std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
@@ -111,12 +121,11 @@ std::optional<CompareResult> Improvement::errors_after(const Joint& joint, const
   return std::nullopt;
 }
 
-std::optional<Improvement::Exchange> Improvement::best_exchange(
+std::vector<Improvement::Exchange> Improvement::possible_exchanges(
     const Joint& joint, const SearchProgress& progress) const {
-  const ErrorChangeOptions& options = context_.options().change;
   const std::vector<EffectAt>& asked = context_.options().diagnose.candidates;
   const std::vector<EffectAt> among = asked.empty() ? candidates(context_.machine()) : asked;
-  std::optional<Exchange> best;
+  std::vector<Exchange> out;
   for (const EffectAt& e : added_) {
     if (e.effect->info().stage != EffectStage::kForce) continue;
     for (const EffectAt& rival : confused_with(among, e)) {
@@ -125,21 +134,35 @@ std::optional<Improvement::Exchange> Improvement::best_exchange(
       const std::optional<CompareResult> errors = errors_after(joint, tried, progress);
       if (!errors) continue;
       const ErrorChange change = error_change(context_.machine(), joint.measured.errors, *errors,
-                                              {{"force"}, ""}, options);
+                                              {{"force"}, ""}, context_.options().change);
       tried.own = change.own;
+      tried.deviations = -std::log(change.overall) / change.overall_deviation;
       if (tracing())
-        fmt::print(
-            stderr,
-            "exchange of {} for {}: force error {:.4f} times, all {:.4f}, log deviation {:.4f}\n",
-            effect_key(e.effect->info(), context_.machine(), e.at),
-            effect_key(rival.effect->info(), context_.machine(), rival.at), change.own,
-            change.overall, change.overall_deviation);
-      const bool beyond_chance =
-          std::log(change.overall) < -options.standard_errors * change.overall_deviation;
-      if (beyond_chance && change.own * options.refit_moves < 1.0 &&
-          (!best || change.own < best->own))
-        best = tried;
+        fmt::print(stderr, "exchange of {} for {}: force error {:.4f} times, {:.2f} deviations\n",
+                   effect_key(e.effect->info(), context_.machine(), e.at),
+                   effect_key(rival.effect->info(), context_.machine(), rival.at), tried.own,
+                   tried.deviations);
+      out.push_back(tried);
     }
+  }
+  return out;
+}
+
+std::optional<Improvement::Exchange> Improvement::best_exchange(
+    const Joint& joint, const SearchProgress& progress) const {
+  const ErrorChangeOptions& options = context_.options().change;
+  const std::vector<Exchange> tried = possible_exchanges(joint, progress);
+  // the largest of several differences is larger by chance (Bonferroni's bound)
+  const auto beyond_chance = [&](double deviations) {
+    const auto tail = [](double z) { return std::erfc(z / std::numbers::sqrt2); };
+    return static_cast<double>(tried.size()) * tail(deviations) < tail(options.standard_errors);
+  };
+  std::optional<Exchange> best;
+  for (const Exchange& t : tried) {
+    const bool better = t.own * options.refit_moves < 1.0 && beyond_chance(t.deviations);
+    // Where chance may have decided, the usual cause stays, so that the last digit of a log does not choose.
+    const bool usual = t.own <= 1.0 && stands_before(t.in, t.out);
+    if ((better || usual) && (!best || t.own < best->own)) best = t;
   }
   return best;
 }
@@ -195,17 +218,17 @@ void Improvement::fail(ExtendStep step, Trial& trial, std::vector<EffectAt>& tes
 
 Improvement::Joint Improvement::joint(const Trial& trial, const SearchProgress& progress) const {
   Joint j;
-  j.judged = context_.with(current_, trial.effects, progress);
-  j.all = places_of(j.judged.model.effects);
-  j.measured = context_.cross_validated(j.judged.model, j.all, progress);
-  j.on_tests = context_.tested_errors(j.judged.model, j.all, progress);
+  j.model = context_.estimated(current_.model, trial.effects, progress);
+  j.all = places_of(j.model.effects);
+  j.measured = context_.cross_validated(j.model, j.all, progress);
+  j.on_tests = context_.tested_errors(j.model, j.all, progress);
   return j;
 }
 
 Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt& e,
                                              const SearchProgress& progress) const {
   const ExtendOptions& options = context_.options();
-  const CraneModel& model = joint.judged.model;
+  const CraneModel& model = joint.model;
   const std::vector<EffectAt> rest = without(joint.all, e);
   const EffectStage stage = e.effect->info().stage;
   const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
@@ -215,14 +238,16 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   step.title = effect_title(e.effect->info(), model.machine, e.at);
   step.effect = model.effects[static_cast<std::size_t>(
       std::find(joint.all.begin(), joint.all.end(), e) - joint.all.begin())];
-  if (learned) {
-    judge_step(context_, e, context_.with(joint.judged, rest, progress).error, joint.judged.error,
-               step);
-  } else {
-    judge_step(context_, e, context_.cross_validated(joint.measured, rest, {e}, progress).errors,
-               joint.measured.errors, step);
-    step.judged_on = context_.measured_on();
-  }
+  const CrossValidated others = context_.cross_validated(joint.measured, rest, {e}, progress);
+  judge_step(context_, e, others.errors, joint.measured.errors, step);
+  step.judged_on = context_.measured_on();
+  if (learned)
+    step.change.own = step.change.own_steady =
+        context_.pressure_change(e, model, others, joint.measured);
+  if (tracing())
+    fmt::print(stderr, "without {}: error {:.4f} times, steady {:.4f}{}\n", step.added,
+               1.0 / step.change.own, 1.0 / step.change.own_steady,
+               is_determined(step.effect) ? "" : ", not determined");
   step.determined = is_determined(step.effect);
   const double change = std::min(step.change.own, step.change.own_steady);
   const bool falls = change * options.change.refit_moves < 1.0;

@@ -30,7 +30,8 @@ class Improvement {
   void test_again(const SearchProgress& progress);
 
   /// Exchanges effects on forces for others that the catalogue says are confused with them, as long as that lowers the error on
-  /// motions left out: which of two was found first depends on what was in the model by then.
+  /// motions left out beyond chance, or puts an effect that the catalogue has first in the place of a later one without raising
+  /// it: which of two was found first depends on what was in the model by then.
   void exchange(const SearchProgress& progress);
 
   /// Effects that the next diagnosis must not name.
@@ -48,10 +49,9 @@ class Improvement {
 
   /// A set of effects estimated together, with the errors by which each of them is judged.
   struct Joint {
-    Judged judged;
+    CraneModel model;  ///< what is learned in it is that of the current model
     std::vector<EffectAt> all;
     CrossValidated measured;
-    std::optional<CompareResult> of_all;    ///< where one of them acts on pressures alone
     std::optional<CompareResult> on_tests;  ///< forces and flows
   };
   /// An effect taken out of a joint set, and whether the data bear it out.
@@ -63,12 +63,17 @@ class Improvement {
   /// An effect of a joint set in place of which another one predicts better.
   struct Exchange {
     EffectAt out, in;
-    double own = 1.0;  ///< [-] error of the forces after over before
+    double own = 1.0;         ///< [-] error of the forces after over before
+    double deviations = 0.0;  ///< [-] fall of the logarithm of all errors over its standard error
   };
   /// Errors of forces and flows after an exchange; absent where the effect acts nowhere in these logs.
   std::optional<CompareResult> errors_after(const Joint& joint, const Exchange& change,
                                             const SearchProgress& progress) const;
-  /// The exchange that lowers the error most, if there is one.
+  /// Exchanges of effects on forces, with their errors.
+  std::vector<Exchange> possible_exchanges(const Joint& joint,
+                                           const SearchProgress& progress) const;
+  /// The exchange that lowers the error most among those that lower it beyond chance or put a usual cause in the place of an
+  /// unusual one without raising it.
   std::optional<Exchange> best_exchange(const Joint& joint, const SearchProgress& progress) const;
 
   std::vector<EffectAt> places(const std::vector<std::string>& keys) const;
@@ -87,8 +92,8 @@ class Improvement {
 
   Joint joint(const Trial& trial, const SearchProgress& progress) const;
 
-  /// The step that takes one effect out of a joint set. The errors of forces and flows are those of a cross-validation;
-  /// effects on pressures alone are judged as a step is.
+  /// The step that takes one effect out of a joint set. The errors are those of a cross-validation, of effects on pressures
+  /// those beside laws that are linear in their coefficients.
   Tested without_one(const Joint& joint, const EffectAt& e, const SearchProgress& progress) const;
 
   /// Of the tested effects the one that the data bear out least, if they do not bear out all.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "diagnosis/evidence/left_out_rows.h"
+#include "diagnosis/extension/error_beside_laws.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -154,6 +156,12 @@ EffectEstimate RefitContext::estimate(CraneModel base, const EffectSet& effects,
   return estimate;
 }
 
+CraneModel RefitContext::estimated(CraneModel model, const std::vector<EffectAt>& effects,
+                                   const SearchProgress& progress) const {
+  model.effects = estimate(model, {effects, effects}, {}, progress).effects;
+  return model;
+}
+
 Judged RefitContext::with(const Judged& from, const std::vector<EffectAt>& effects,
                           const SearchProgress& progress, std::vector<std::string>* notes) const {
   const auto part = [&](double first, double width) {
@@ -242,6 +250,35 @@ CrossValidated RefitContext::cross_validated(const CrossValidated& was,
     out.models.push_back(measured_model(was.models[f], {effects, again}, fold(f), progress));
   out.errors = errors_on_folds(out.models);
   return out;
+}
+
+Evidence RefitContext::evidence_on_fold(std::size_t f, const EffectAt& effect, CraneModel from,
+                                        const std::vector<AppliedEffect>& effects) const {
+  from.effects = effects;
+  EvidenceOptions how = options_.diagnose.evidence;
+  how.kinds = effect.effect->shows_in();
+  std::vector<AppliedEffect> in_references = in_references_;
+  std::erase_if(in_references, [&](const AppliedEffect& k) {
+    return std::none_of(effects.begin(), effects.end(), [&](const AppliedEffect& e) {
+      return e.effect == k.effect && e.at == k.at;
+    });
+  });
+  Evidence evidence = collect_evidence(from, signals_, references_, &in_references, how);
+  std::vector<Mask> others;
+  for (const Mask& held : fold(f)) others.push_back(!held);
+  for (EvidenceChannel& c : evidence.channels) c = without_rows(c, others);
+  return evidence;
+}
+
+double RefitContext::pressure_change(const EffectAt& effect, const CraneModel& from,
+                                     const CrossValidated& before,
+                                     const CrossValidated& after) const {
+  PressureErrors errors;
+  for (std::size_t f = 0; f < fold_count(); ++f) {
+    errors.add(errors_beside_laws(evidence_on_fold(f, effect, from, before.models[f].effects),
+                                  evidence_on_fold(f, effect, from, after.models[f].effects)));
+  }
+  return errors.change(options_.change.acts_share);
 }
 
 std::optional<CompareResult> RefitContext::tested_errors(const CraneModel& from,

@@ -52,6 +52,10 @@ class RefitContext {
   Judged with(const Judged& from, const std::vector<EffectAt>& effects,
               const SearchProgress& progress, std::vector<std::string>* notes = nullptr) const;
 
+  /// The model with these effects, estimated together; what is learned stays.
+  CraneModel estimated(CraneModel model, const std::vector<EffectAt>& effects,
+                       const SearchProgress& progress) const;
+
   /// The effects estimated, and the valve gains learned, without the motions that they are judged on. Pressures take no
   /// part, so that this takes a fraction of the time of `with`.
   CrossValidated cross_validated(const CraneModel& from, const std::vector<EffectAt>& effects,
@@ -62,6 +66,11 @@ class RefitContext {
   CrossValidated cross_validated(const CrossValidated& was, const std::vector<EffectAt>& effects,
                                  const std::vector<EffectAt>& changed,
                                  const SearchProgress& progress) const;
+
+  /// Error of the pressures in which an effect shows, after over before: `after` has the effect, `before` does not. Both are
+  /// counted on the motions left out, beside laws that are fitted to these (error_beside_laws.h). 1 where it moves nothing.
+  double pressure_change(const EffectAt& effect, const CraneModel& from,
+                         const CrossValidated& before, const CrossValidated& after) const;
 
   /// Errors of forces and flows on the test logs, which may contradict an effect; without test logs empty.
   std::optional<CompareResult> tested_errors(const CraneModel& from,
@@ -93,6 +102,10 @@ class RefitContext {
   const std::vector<Mask>& fold(std::size_t f) const;
   /// Joint errors of one model for each fold, on that fold's samples.
   CompareResult errors_on_folds(const std::vector<CraneModel>& models) const;
+  /// Evidence of the channels in which an effect shows, on the samples of one fold alone.
+  /// @param effects of the model  @param from gives the pump's margins
+  Evidence evidence_on_fold(std::size_t f, const EffectAt& effect, CraneModel from,
+                            const std::vector<AppliedEffect>& effects) const;
   Judged as_references_say(const CraneModel& model, std::vector<std::string>& notes,
                            const SearchProgress& progress) const;
   CompareOptions compare_options() const;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/evidence/left_out_rows.h"
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/effect_intervals.h"
 #include "diagnosis/selection/leader_updates.h"
@@ -39,39 +40,6 @@ std::vector<const EffectParameter*> shape_parameters(const Effect& effect) {
   for (const EffectParameter& p : effect.info().parameters) {
     if (!p.linear) out.push_back(&p);
   }
-  return out;
-}
-
-/// The channel without the rows in the masks; a block that loses rows in its middle becomes two.
-EvidenceChannel without(const EvidenceChannel& all, const std::vector<Mask>& leave_out) {
-  EvidenceChannel out = all;
-  out.blocks.clear();
-  out.log.clear();
-  out.sample.clear();
-  std::vector<Index> kept;
-  for (std::size_t b = 0; b < all.blocks.size(); ++b) {
-    const auto log = static_cast<std::size_t>(all.log[b]);
-    bool open = false;
-    for (Index r = all.blocks[b].first; r < all.blocks[b].last; ++r) {
-      const Index k = all.sample[static_cast<std::size_t>(r)];
-      if (log < leave_out.size() && leave_out[log][k]) {
-        open = false;
-        continue;
-      }
-      const auto row = static_cast<Index>(kept.size());
-      if (!open) {
-        out.blocks.push_back({row, row});
-        out.log.push_back(all.log[b]);
-        open = true;
-      }
-      kept.push_back(r);
-      out.sample.push_back(k);
-      out.blocks.back().last = row + 1;
-    }
-  }
-  out.y = all.y(kept).eval();
-  out.since_change = all.since_change.of_rows(kept);
-  out.baseline = all.baseline(kept, Eigen::all).eval();
   return out;
 }
 
@@ -174,7 +142,7 @@ class Estimator {
     for (MachineSeries& s : evidence.series)
       s = with_passed_flows(known_, with_openings(known_, std::move(s)));
     if (leave_out_.empty()) return evidence;
-    for (EvidenceChannel& c : evidence.channels) c = without(c, leave_out_);
+    for (EvidenceChannel& c : evidence.channels) c = without_rows(c, leave_out_);
     return evidence;
   }
 

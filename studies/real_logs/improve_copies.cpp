@@ -169,7 +169,7 @@ CopyResult result_of(const Tables& tables, const Machine& machine, const std::st
 }
 
 struct Arguments {
-  std::string machine;
+  std::string machine, only;
   std::vector<std::string> logs, left_out;
 };
 
@@ -180,8 +180,10 @@ int run(const Arguments& a, Journal& journal) {
   for (const std::string& f : a.left_out) apart.push_back(read_table(f));
   const std::vector<Log> tests = logs_of(apart, machine);
   std::map<std::string, int> sets;
+  int count = 0;
   for (const auto& copy : copies(as_is)) {
     const std::string& name = copy.first;
+    if (name.find(a.only) == std::string::npos) continue;
     const Tables& tables = copy.second;
     const std::string bytes = journal.kept(name, [&] {
       const CopyResult r = result_of(tables, machine, name, tests);
@@ -189,12 +191,14 @@ int run(const Arguments& a, Journal& journal) {
     });
     Unpacker u(bytes);
     ++sets[u.text()];
+    ++count;
     fmt::print("{}", u.text());
     std::fflush(stdout);
   }
+  if (count == 0) throw UsageError("--only: no copy has \"" + a.only + "\" in its name");
   const auto most = std::max_element(
       sets.begin(), sets.end(), [](const auto& x, const auto& y) { return x.second < y.second; });
-  fmt::print("same set in {} of 10 copies: {}\n", most->second, most->first);
+  fmt::print("same set in {} of {} copies: {}\n", most->second, count, most->first);
   journal.remove();
   return 0;
 }
@@ -205,6 +209,7 @@ int run_with(int argc, char** argv) {
   app.add("-m,--machine", a.machine, "machine file").required();
   app.add("-l,--log", a.logs, "logs to learn from (CSV)").required();
   app.add("-t,--test", a.left_out, "logs that take no part");
+  app.add("--only", a.only, "copies alone that have this in their name");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
   std::vector<std::string> files = a.logs;
