@@ -11,7 +11,7 @@
 #include <set>
 
 #include "diagnosis/extension/extend.h"
-#include "identification/comparison/report_numbers.h"
+#include "diagnosis/selection/effect_intervals.h"
 #include "models/files/machine_file.h"
 #include "models/math/error.h"
 #include "optimizer/solve/child_processes.h"
@@ -195,12 +195,6 @@ Diagnosis baseline_diagnosis(const std::string& judge, const Crane& crane) {
   return d;
 }
 
-/// Whether a parameter's value is said at all: the logs determine it.
-bool is_said(const AppliedEffect& e, std::size_t k) {
-  return k >= e.lower95.size() || is_determined(e.values[k], e.lower95[k], e.upper95[k],
-                                                e.effect->info().parameters[k].typical);
-}
-
 /// Compares the parameters of named effects with the text-book equivalents of the hidden law.
 void judge_parameters(const Diagnosis& d, const std::vector<HiddenTruth>& truth, BlindRun& run) {
   for (const HiddenTruth& t : truth) {
@@ -210,7 +204,7 @@ void judge_parameters(const Diagnosis& d, const std::vector<HiddenTruth>& truth,
       for (std::size_t k = 0; k < info.parameters.size(); ++k) {
         for (const HiddenParameter& p : t.parameters) {
           if (p.name != info.parameters[k].name || p.equivalent == 0.0) continue;
-          if (e.applied.values.empty() || !is_said(e.applied, k)) continue;
+          if (e.applied.values.empty() || !value_is_determined(e.applied, k)) continue;
           run.errors.push_back(std::abs(e.applied.values[k] / p.equivalent - 1.0));
           if (e.applied.lower95.empty()) continue;
           run.covered.push_back(p.equivalent >= e.applied.lower95[k] &&

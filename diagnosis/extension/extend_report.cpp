@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/extension/extend.h"
+#include "diagnosis/selection/effect_intervals.h"
 #include "identification/comparison/report_numbers.h"
 
 namespace sparflow {
@@ -33,7 +34,7 @@ std::string parameters_text(const AppliedEffect& e) {
     if (is_absent(q, e.values[p])) continue;
     const std::string unit = q.unit.empty() || q.unit == "-" ? "" : " " + q.unit;
     const bool choice = q.choice || p >= e.lower95.size();
-    if (!choice && !is_determined(e.values[p], e.lower95[p], e.upper95[p], q.typical)) {
+    if (!choice && !value_is_determined(e, p)) {
       text += fmt::format("{}{} is not determined by these logs", text.empty() ? "" : ", ", q.name);
       continue;
     }
@@ -156,15 +157,12 @@ Json parameters_json(const AppliedEffect& e) {
     const EffectParameter& q = e.effect->info().parameters[p];
     if (is_absent(q, e.values[p])) continue;
     Json ci = nullptr;
-    bool determined = true;
-    if (p < e.lower95.size()) {
-      determined = is_determined(e.values[p], e.lower95[p], e.upper95[p], q.typical);
+    if (p < e.lower95.size())
       ci = {value_or_null(e.lower95[p] / q.si), value_or_null(e.upper95[p] / q.si)};
-    }
     parameters.push_back({{"name", q.name},
                           {"value", e.values[p] / q.si},
                           {"unit", q.unit},
-                          {"determined", determined},
+                          {"determined", value_is_determined(e, p)},
                           {"ci95", ci}});
   }
   return parameters;

@@ -17,7 +17,7 @@ namespace {
 
 /// Whether the logs determine that an effect is there at all: the 95 % interval of one of the parameters to which it is
 /// proportional excludes zero. True for an effect without such a parameter or without intervals.
-bool is_determined(const AppliedEffect& e) {
+bool acts_for_certain(const AppliedEffect& e) {
   if (e.lower95.size() != e.values.size()) return true;
   bool proportional = false;
   for (std::size_t k = 0; k < e.values.size(); ++k) {
@@ -175,7 +175,7 @@ void Improvement::exchange(const SearchProgress& progress) {
     if (!best) return;
     TriedStep removed = try_removing(context_, current_, best->out, progress);
     TriedStep added = try_adding(context_, removed.next, best->in, progress);
-    if (!is_determined(added.step.effect)) return;
+    if (!acts_for_certain(added.step.effect)) return;
     keep(std::move(removed), context_, current_, result_);
     keep(std::move(added), context_, current_, result_);
     added_ = without(std::move(added_), best->out);
@@ -247,8 +247,8 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   if (tracing())
     fmt::print(stderr, "without {}: error {:.4f} times, steady {:.4f}{}\n", step.added,
                1.0 / step.change.own, 1.0 / step.change.own_steady,
-               is_determined(step.effect) ? "" : ", not determined");
-  step.determined = is_determined(step.effect);
+               acts_for_certain(step.effect) ? "" : ", not determined");
+  step.determined = acts_for_certain(step.effect);
   const double change = std::min(step.change.own, step.change.own_steady);
   const bool falls = change * options.change.refit_moves < 1.0;
   // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.

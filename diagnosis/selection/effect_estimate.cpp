@@ -289,17 +289,12 @@ class Estimator {
     return true;
   }
 
-  /// Whether the logs determine a parameter; the bound on which another one lies says nothing.
-  static bool says_something(const AppliedEffect& e, std::size_t p) {
-    return p >= e.lower95.size() || is_determined(e.values[p], e.lower95[p], e.upper95[p],
-                                                  e.effect->info().parameters[p].typical);
-  }
-
   void add_notes(EffectEstimate& out) const {
     for (const AppliedEffect& e : out.effects) {
       for (std::size_t p = 0; p < e.values.size(); ++p) {
         const EffectParameter& parameter = e.effect->info().parameters[p];
-        if (parameter.choice || is_absent(parameter, e.values[p]) || !says_something(e, p))
+        // the bound on which a parameter lies that the logs do not determine says nothing
+        if (parameter.choice || is_absent(parameter, e.values[p]) || !value_is_determined(e, p))
           continue;
         const double span = parameter.upper - parameter.lower, v = e.values[p];
         if (v > parameter.lower + kOnBound * span && v < parameter.upper - kOnBound * span)

@@ -169,6 +169,12 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
   }
 }
 
+bool value_is_determined(const AppliedEffect& effect, std::size_t p) {
+  return p >= effect.lower95.size() ||
+         is_determined(effect.values[p], effect.lower95[p], effect.upper95[p],
+                       effect.effect->info().parameters[p].typical);
+}
+
 std::vector<double> parameter_values(const Effect& effect, const VectorXd& linear,
                                      const std::vector<double>& shape) {
   std::vector<double> values;

@@ -15,6 +15,9 @@ namespace sparflow {
 /// Fills in values, lower95, upper95 [SI] and not_significant of each effect.
 void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& found);
 
+/// Whether the logs determine the value of parameter `p` of an effect (is_determined); true where it has no interval.
+bool value_is_determined(const AppliedEffect& effect, std::size_t p);
+
 /// All parameters in the order of info().parameters, from the linear and the nonlinear (`shape`) ones. [SI]
 std::vector<double> parameter_values(const Effect& effect, const Eigen::VectorXd& linear,
                                      const std::vector<double>& shape);

@@ -11,6 +11,7 @@ namespace {
 
 std::vector<std::unique_ptr<Effect>>& mutable_catalogue() {
   static std::vector<std::unique_ptr<Effect>> all = [] {
+    // Of effects that are confused with each other the usual cause comes first; `improve` prefers it where chance may decide.
     std::vector<std::unique_ptr<Effect>> list;
     list.push_back(make_unmodelled_mass());
     list.push_back(make_payload_error());

@@ -148,9 +148,9 @@ struct CopyResult {
 };
 
 CopyResult result_of(const Tables& tables, const Machine& machine, const std::string& name,
-                     const std::vector<Log>& tests) {
+                     const std::vector<Log>& tests, const ExtendOptions& options) {
   const ExtendLogs logs{logs_of(tables, machine), {}, {}};
-  const ExtendResult r = improve(fit(machine, logs.suspects).model, logs);
+  const ExtendResult r = improve(fit(machine, logs.suspects).model, logs, options);
   std::vector<std::string> keys;
   for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
   std::sort(keys.begin(), keys.end());
@@ -170,6 +170,7 @@ CopyResult result_of(const Tables& tables, const Machine& machine, const std::st
 
 struct Arguments {
   std::string machine, only;
+  int folds = ExtendOptions().folds;
   std::vector<std::string> logs, left_out;
 };
 
@@ -179,6 +180,8 @@ int run(const Arguments& a, Journal& journal) {
   for (const std::string& f : a.logs) as_is.push_back(read_table(f));
   for (const std::string& f : a.left_out) apart.push_back(read_table(f));
   const std::vector<Log> tests = logs_of(apart, machine);
+  ExtendOptions options;
+  options.folds = a.folds;
   std::map<std::string, int> sets;
   int count = 0;
   for (const auto& copy : copies(as_is)) {
@@ -186,7 +189,7 @@ int run(const Arguments& a, Journal& journal) {
     if (name.find(a.only) == std::string::npos) continue;
     const Tables& tables = copy.second;
     const std::string bytes = journal.kept(name, [&] {
-      const CopyResult r = result_of(tables, machine, name, tests);
+      const CopyResult r = result_of(tables, machine, name, tests, options);
       return Journal::Part{Packer().text(r.set).text(r.text).bytes(), true};
     });
     Unpacker u(bytes);
@@ -209,6 +212,7 @@ int run_with(int argc, char** argv) {
   app.add("-m,--machine", a.machine, "machine file").required();
   app.add("-l,--log", a.logs, "logs to learn from (CSV)").required();
   app.add("-t,--test", a.left_out, "logs that take no part");
+  app.add("--folds", a.folds, "of the cross-validation by which effects are judged");
   app.add("--only", a.only, "copies alone that have this in their name");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;

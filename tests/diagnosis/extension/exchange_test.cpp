@@ -23,7 +23,8 @@ using testing_support::HiddenCase;
 
 /// `improve` on a log, where an earlier run has put one effect into the model and may add no other one.
 std::vector<std::string> after_exchange(const Machine& machine, const Log& log,
-                                        const std::string& first) {
+                                        const std::string& first,
+                                        const std::vector<std::string>& candidates) {
   const std::string path =
       (std::filesystem::temp_directory_path() / ("sparflow_exchange_" + std::to_string(::getpid())))
           .string();
@@ -33,8 +34,8 @@ std::vector<std::string> after_exchange(const Machine& machine, const Log& log,
   ExtendOptions options;
   options.journal = &journal;
   options.max_steps = 1;
-  options.diagnose.candidates = {parse_effect("unmodelled_mass:jib", machine),
-                                 parse_effect("angle_offset:jib", machine)};
+  for (const std::string& key : candidates)
+    options.diagnose.candidates.push_back(parse_effect(key, machine));
   const ExtendResult r = improve(fit(machine, {log}).model, {{log}, {}, {}}, options);
   journal.remove();
   std::vector<std::string> keys;
@@ -44,12 +45,24 @@ std::vector<std::string> after_exchange(const Machine& machine, const Log& log,
 
 TEST(ImproveExchange, TheBetterOfTwoConfusedEffectsStaysWhicheverCameFirst) {
   const Machine machine = drawn_machine("loader_crane");
+  const std::vector<std::string> both = {"unmodelled_mass:jib", "angle_offset:jib"};
   const HiddenCase beside = hidden_case(machine, {{"unmodelled_mass", "jib", 1.0, 2}}, {7, 100.0});
-  EXPECT_THAT(after_exchange(machine, beside.train, "angle_offset:jib"),
+  EXPECT_THAT(after_exchange(machine, beside.train, "angle_offset:jib", both),
               ElementsAre("unmodelled_mass:jib"));
   const HiddenCase offset = hidden_case(machine, {{"angle_offset", "jib", 1.0, 0}}, {7, 100.0});
-  EXPECT_THAT(after_exchange(machine, offset.train, "unmodelled_mass:jib"),
+  EXPECT_THAT(after_exchange(machine, offset.train, "unmodelled_mass:jib", both),
               ElementsAre("angle_offset:jib"));
+}
+
+/// Dry friction and its elastic form differ at reversals alone, which 2 % of the error do not show: the usual one stays.
+TEST(ImproveExchange, TheUsualOneStaysWhereChanceMayHaveDecided) {
+  const Machine machine = drawn_machine("loader_crane");
+  const std::vector<std::string> both = {"coulomb_friction:boom", "presliding:boom"};
+  const HiddenCase dry = hidden_case(machine, {{"coulomb_friction", "boom", 0.3, 0}}, {7, 60.0});
+  EXPECT_THAT(after_exchange(machine, dry.train, "presliding:boom", both),
+              ElementsAre("coulomb_friction:boom"));
+  EXPECT_THAT(after_exchange(machine, dry.train, "coulomb_friction:boom", both),
+              ElementsAre("coulomb_friction:boom"));
 }
 
 /// A mass at the end of the boom, on the jib's link, loads all cylinders as a moment of the boom does: the one that comes second
