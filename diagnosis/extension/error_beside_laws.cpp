@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "models/math/linear_algebra.h"
 
@@ -16,10 +15,10 @@ using Eigen::VectorXd;
 /// Rows of two channels that are the same sample of the same log.
 struct CommonRows {
   std::vector<Index> first, second;
-  std::vector<bool> suspect;  ///< references determine the laws, and their errors do not count
+  std::vector<std::pair<int, Index>> place;  ///< log and sample
 };
 
-CommonRows common_rows(const EvidenceChannel& a, const EvidenceChannel& b, std::size_t suspects) {
+CommonRows common_rows(const EvidenceChannel& a, const EvidenceChannel& b) {
   std::map<std::pair<int, Index>, Index> in_b;
   for (std::size_t k = 0; k < b.blocks.size(); ++k)
     for (Index r = b.blocks[k].first; r < b.blocks[k].last; ++r)
@@ -27,11 +26,12 @@ CommonRows common_rows(const EvidenceChannel& a, const EvidenceChannel& b, std::
   CommonRows out;
   for (std::size_t k = 0; k < a.blocks.size(); ++k) {
     for (Index r = a.blocks[k].first; r < a.blocks[k].last; ++r) {
-      const auto at = in_b.find({a.log[k], a.sample[static_cast<std::size_t>(r)]});
+      const std::pair<int, Index> place{a.log[k], a.sample[static_cast<std::size_t>(r)]};
+      const auto at = in_b.find(place);
       if (at == in_b.end()) continue;
       out.first.push_back(r);
       out.second.push_back(at->second);
-      out.suspect.push_back(static_cast<std::size_t>(a.log[k]) < suspects);
+      out.place.push_back(place);
     }
   }
   return out;
@@ -47,6 +47,19 @@ VectorXd left_by_laws(const EvidenceChannel& channel, const std::vector<Index>& 
 
 }  // namespace
 
+void PressureErrors::Sums::add(const Sums& other) {
+  before += other.before;
+  after += other.after;
+  moved += other.moved;
+  rows += other.rows;
+}
+
+PressureErrors::Sums PressureErrors::Channel::all() const {
+  Sums out;
+  for (const auto& [piece, sums] : pieces) out.add(sums);
+  return out;
+}
+
 void PressureErrors::add(const PressureErrors& other) {
   for (const Channel& o : other.channels) {
     const auto same = std::find_if(channels.begin(), channels.end(), [&](const Channel& c) {
@@ -56,42 +69,60 @@ void PressureErrors::add(const PressureErrors& other) {
       channels.push_back(o);
       continue;
     }
-    same->before += o.before;
-    same->after += o.after;
-    same->moved += o.moved;
-    same->rows += o.rows;
+    for (const auto& [piece, sums] : o.pieces) same->pieces[piece].add(sums);
   }
 }
 
-double PressureErrors::change(double least_share) const {
+PressureChange PressureErrors::change(double least_share) const {
+  struct Part {
+    double added = 0.0;  // to the mean's logarithm, to first order
+    double rows = 0.0;
+  };
+  std::map<Piece, Part> parts;
   double sum = 0.0, rows = 0.0;
   for (const Channel& c : channels) {
-    if (!(c.moved > least_share * least_share * c.before) || !(c.after > 0.0)) continue;
-    sum += c.rows * 0.5 * std::log(c.after / c.before);
-    rows += c.rows;
+    const Sums all = c.all();
+    if (!(all.moved > least_share * least_share * all.before) || !(all.after > 0.0)) continue;
+    sum += all.rows * 0.5 * std::log(all.after / all.before);
+    rows += all.rows;
+    for (const auto& [piece, s] : c.pieces) {
+      parts[piece].added += all.rows * (s.after - s.before) / (all.before + all.after);
+      parts[piece].rows += s.rows;
+    }
   }
-  return rows > 0.0 ? std::exp(sum / rows) : 1.0;
+  PressureChange out;
+  if (!(rows > 0.0)) return out;
+  out.ratio = std::exp(sum / rows);
+  const auto n = static_cast<double>(parts.size());
+  if (n < 2.0) return out;
+  double added = 0.0, squares = 0.0;
+  for (const auto& [piece, p] : parts) added += p.added;
+  for (const auto& [piece, p] : parts) squares += std::pow(p.added - added / rows * p.rows, 2);
+  const double deviation = std::sqrt(squares * n / (n - 1.0)) / rows;
+  if (deviation > 0.0) out.deviations = -sum / rows / deviation;
+  return out;
 }
 
-PressureErrors errors_beside_laws(const Evidence& before, const Evidence& after) {
+PressureErrors errors_beside_laws(const Evidence& before, const Evidence& after, double piece_s) {
   PressureErrors out;
   for (const EvidenceChannel& b : before.channels) {
     if (b.kind == EvidenceKind::kForce || b.kind == EvidenceKind::kFlow) continue;
     const EvidenceChannel* a = after.find(b.kind, b.index);
     if (a == nullptr) continue;
-    const CommonRows rows = common_rows(b, *a, before.suspects);
+    const CommonRows rows = common_rows(b, *a);
     if (rows.first.empty()) continue;
     const VectorXd was = left_by_laws(b, rows.first), is = left_by_laws(*a, rows.second);
-    PressureErrors::Channel sums{b.kind, b.index};
-    for (std::size_t k = 0; k < rows.first.size(); ++k) {
-      if (!rows.suspect[k]) continue;
+    PressureErrors::Channel channel{b.kind, b.index, {}};
+    for (std::size_t k = 0; k < rows.place.size(); ++k) {
+      const auto [log, sample] = rows.place[k];
+      // references determine the laws, and their errors do not count
+      if (static_cast<std::size_t>(log) >= before.suspects) continue;
+      const double time = before.series[static_cast<std::size_t>(log)].time[sample];
       const auto r = static_cast<Index>(k);
-      sums.before += was[r] * was[r];
-      sums.after += is[r] * is[r];
-      sums.moved += (is[r] - was[r]) * (is[r] - was[r]);
-      sums.rows += 1.0;
+      channel.pieces[{log, static_cast<int>(std::floor(time / piece_s))}].add(
+          {was[r] * was[r], is[r] * is[r], (is[r] - was[r]) * (is[r] - was[r]), 1.0});
     }
-    if (sums.rows > 0.0) out.channels.push_back(sums);
+    if (!channel.pieces.empty()) out.channels.push_back(std::move(channel));
   }
   return out;
 }

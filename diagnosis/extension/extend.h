@@ -77,10 +77,10 @@ struct ExtendOptions {
   /// @threshold [1] 0..0.02; chosen: a twentieth of what learning anew may change
   /// (ErrorChangeOptions::refit_moves)
   double unmoved = 1e-3;
-  /// Folds of the cross-validation by which `improve` judges forces and flows.
-  /// @threshold [folds] 2..10; chosen: two cost least, and half of the motions still determine what
-  /// a diagnosis of all has found
-  int folds = 2;
+  /// Folds of the cross-validation by which `improve` judges effects.
+  /// @threshold [folds] 2..10; chosen: with two, half of the motions of a few short logs did not
+  /// determine a mass with its two moments, which all of them do
+  int folds = 4;
   /// Keeps each round of `improve` that another one follows, so that a run that was ended can be resumed; null: none is kept.
   /// It must outlive the run, and belong to these options, this model and these logs.
   Journal* journal = nullptr;

@@ -206,6 +206,7 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
           keep_round(options.journal, ++rounds, round);
       }
     }
+    improvement.add_to_pressures(part(0.3));
     improvement.exchange(part(0.3));
     improvement.test_again(part(0.5));
   } catch (const Interruption&) {  // what was kept so far stays

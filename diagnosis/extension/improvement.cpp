@@ -7,8 +7,10 @@
 #include <limits>
 #include <numbers>
 
+#include "diagnosis/selection/effect_intervals.h"
 #include "diagnosis/selection/search_state.h"
 #include "identification/comparison/error_change.h"
+#include "models/effects/plausible.h"
 #include "models/effects/registry.h"
 #include "models/math/error.h"
 
@@ -53,6 +55,12 @@ std::vector<EffectAt> confused_with(const std::vector<EffectAt>& among, const Ef
       out.push_back(c);
   }
   return out;
+}
+
+/// Whether an effect acts on quantities whose laws are learned.
+bool acts_on_pressures(const EffectAt& e) {
+  const EffectStage stage = e.effect->info().stage;
+  return stage == EffectStage::kPressure || stage == EffectStage::kPump;
 }
 
 /// Whether the catalogue, which lists usual causes before unusual ones, has one effect before another.
@@ -148,18 +156,77 @@ std::vector<Improvement::Exchange> Improvement::possible_exchanges(
   return out;
 }
 
+bool Improvement::beyond_chance(double deviations, std::size_t tried) const {
+  const auto tail = [](double z) { return std::erfc(z / std::numbers::sqrt2); };
+  return static_cast<double>(tried) * tail(deviations) <
+         tail(context_.options().change.standard_errors);
+}
+
+std::vector<EffectAt> Improvement::not_tested_on_pressures() const {
+  const std::vector<EffectAt>& asked = context_.options().diagnose.candidates;
+  std::vector<EffectAt> out = asked.empty() ? candidates(context_.machine()) : asked;
+  const std::vector<EffectAt> has = places_of(current_.model.effects);
+  std::erase_if(out, [&](const EffectAt& c) {
+    const bool failed = std::any_of(
+        result_.rejected.begin(), result_.rejected.end(),
+        [&](const ExtendStep& r) { return r.effect.effect == c.effect && r.effect.at == c.at; });
+    return !acts_on_pressures(c) || failed || contains(has, c);
+  });
+  return out;
+}
+
+void Improvement::add_to_pressures(const SearchProgress& progress) {
+  const double refit_moves = context_.options().change.refit_moves;
+  std::vector<EffectAt> open = not_tested_on_pressures();
+  while (!open.empty() && added_.size() < static_cast<std::size_t>(context_.options().max_steps)) {
+    const Joint j = joint({places_of(current_.model.effects), {}, nullptr}, progress);
+    std::optional<EffectAt> best;
+    double least = 1.0 / refit_moves;
+    for (const EffectAt& e : open) {
+      const PressureChange change = change_with(j, e, progress);
+      if (tracing() && change.ratio != 1.0)
+        fmt::print(stderr, "with {}: pressure error {:.4f} times, {:.2f} deviations\n",
+                   effect_key(e.effect->info(), context_.machine(), e.at), change.ratio,
+                   change.deviations);
+      if (change.ratio < least) best = e, least = change.ratio;
+    }
+    if (!best) return;
+    open = without(std::move(open), *best);
+    TriedStep tried = try_adding(context_, current_, *best, progress);
+    if (!is_sound(tried.step.effect)) continue;
+    keep(std::move(tried), context_, current_, result_);
+    added_.push_back(*best);
+  }
+}
+
+PressureChange Improvement::change_with(const Joint& joint, const EffectAt& e,
+                                        const SearchProgress& progress) const try {
+  std::vector<EffectAt> all = joint.all;
+  all.push_back(e);
+  return context_.pressure_change(e, joint.model, joint.measured,
+                                  context_.cross_validated(joint.measured, all, {e}, progress));
+} catch (const InputError&) {  // these logs do not show it
+  return {};
+}
+
+bool Improvement::is_sound(const AppliedEffect& e) const {
+  const std::vector<EffectParameter>& parameters = e.effect->info().parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (!parameters[p].choice && !is_absent(parameters[p], e.values[p]) &&
+        lies_on_bound(parameters[p], e.values[p]))
+      return false;
+  }
+  return acts_for_certain(e) && beyond_plausible(context_.machine(), e).empty();
+}
+
 std::optional<Improvement::Exchange> Improvement::best_exchange(
     const Joint& joint, const SearchProgress& progress) const {
   const ErrorChangeOptions& options = context_.options().change;
   const std::vector<Exchange> tried = possible_exchanges(joint, progress);
-  // the largest of several differences is larger by chance (Bonferroni's bound)
-  const auto beyond_chance = [&](double deviations) {
-    const auto tail = [](double z) { return std::erfc(z / std::numbers::sqrt2); };
-    return static_cast<double>(tried.size()) * tail(deviations) < tail(options.standard_errors);
-  };
   std::optional<Exchange> best;
   for (const Exchange& t : tried) {
-    const bool better = t.own * options.refit_moves < 1.0 && beyond_chance(t.deviations);
+    const bool better =
+        t.own * options.refit_moves < 1.0 && beyond_chance(t.deviations, tried.size());
     // Where chance may have decided, the usual cause stays, so that the last digit of a log does not choose.
     const bool usual = t.own <= 1.0 && stands_before(t.in, t.out);
     if ((better || usual) && (!best || t.own < best->own)) best = t;
@@ -230,8 +297,7 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   const ExtendOptions& options = context_.options();
   const CraneModel& model = joint.model;
   const std::vector<EffectAt> rest = without(joint.all, e);
-  const EffectStage stage = e.effect->info().stage;
-  const bool learned = stage == EffectStage::kPressure || stage == EffectStage::kPump;
+  const bool learned = acts_on_pressures(e);
   Tested tested;
   ExtendStep& step = tested.step;
   step.added = effect_key(e.effect->info(), model.machine, e.at);
@@ -243,7 +309,7 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   step.judged_on = context_.measured_on();
   if (learned)
     step.change.own = step.change.own_steady =
-        context_.pressure_change(e, model, others, joint.measured);
+        context_.pressure_change(e, model, others, joint.measured).ratio;
   if (tracing())
     fmt::print(stderr, "without {}: error {:.4f} times, steady {:.4f}{}\n", step.added,
                1.0 / step.change.own, 1.0 / step.change.own_steady,

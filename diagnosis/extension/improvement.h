@@ -34,6 +34,10 @@ class Improvement {
   /// it: which of two was found first depends on what was in the model by then.
   void exchange(const SearchProgress& progress);
 
+  /// Adds effects on pressures that no diagnosis named, because learned laws imitate them or few motions show them, by
+  /// the measure by which effects that a diagnosis named stay: they lower the error of the pressures on motions left out.
+  void add_to_pressures(const SearchProgress& progress);
+
   /// Effects that the next diagnosis must not name.
   const std::vector<EffectAt>& excluded() const { return aside_; }
   std::size_t rejected() const { return rejected_; }
@@ -66,6 +70,16 @@ class Improvement {
     double own = 1.0;         ///< [-] error of the forces after over before
     double deviations = 0.0;  ///< [-] fall of the logarithm of all errors over its standard error
   };
+  /// Whether a fall of an error by so many deviations is more than the largest of several by chance (Bonferroni's bound).
+  bool beyond_chance(double deviations, std::size_t tried) const;
+  /// Effects on pressures that are neither in the model nor were taken out of it.
+  std::vector<EffectAt> not_tested_on_pressures() const;
+  /// What an effect on pressures that is added to a joint set changes; nothing where these logs do not show it.
+  PressureChange change_with(const Joint& joint, const EffectAt& e,
+                             const SearchProgress& progress) const;
+  /// Whether the logs determine an effect, with values inside their bounds and plausible on this machine.
+  bool is_sound(const AppliedEffect& e) const;
+
   /// Errors of forces and flows after an exchange; absent where the effect acts nowhere in these logs.
   std::optional<CompareResult> errors_after(const Joint& joint, const Exchange& change,
                                             const SearchProgress& progress) const;

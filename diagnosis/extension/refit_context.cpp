@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "diagnosis/evidence/left_out_rows.h"
-#include "diagnosis/extension/error_beside_laws.h"
 #include "models/math/error.h"
 
 namespace sparflow {
@@ -270,13 +269,14 @@ Evidence RefitContext::evidence_on_fold(std::size_t f, const EffectAt& effect, C
   return evidence;
 }
 
-double RefitContext::pressure_change(const EffectAt& effect, const CraneModel& from,
-                                     const CrossValidated& before,
-                                     const CrossValidated& after) const {
+PressureChange RefitContext::pressure_change(const EffectAt& effect, const CraneModel& from,
+                                             const CrossValidated& before,
+                                             const CrossValidated& after) const {
   PressureErrors errors;
   for (std::size_t f = 0; f < fold_count(); ++f) {
     errors.add(errors_beside_laws(evidence_on_fold(f, effect, from, before.models[f].effects),
-                                  evidence_on_fold(f, effect, from, after.models[f].effects)));
+                                  evidence_on_fold(f, effect, from, after.models[f].effects),
+                                  options_.change.blocks.longest_s));
   }
   return errors.change(options_.change.acts_share);
 }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/extension/error_beside_laws.h"
 #include "diagnosis/extension/extend.h"
 #include "diagnosis/selection/effect_estimate.h"
 
@@ -67,10 +68,10 @@ class RefitContext {
                                  const std::vector<EffectAt>& changed,
                                  const SearchProgress& progress) const;
 
-  /// Error of the pressures in which an effect shows, after over before: `after` has the effect, `before` does not. Both are
-  /// counted on the motions left out, beside laws that are fitted to these (error_beside_laws.h). 1 where it moves nothing.
-  double pressure_change(const EffectAt& effect, const CraneModel& from,
-                         const CrossValidated& before, const CrossValidated& after) const;
+  /// Change of the error of the pressures in which an effect shows: `after` has the effect, `before` does not. Both are
+  /// counted on the motions left out, beside laws that are fitted to these.
+  PressureChange pressure_change(const EffectAt& effect, const CraneModel& from,
+                                 const CrossValidated& before, const CrossValidated& after) const;
 
   /// Errors of forces and flows on the test logs, which may contradict an effect; without test logs empty.
   std::optional<CompareResult> tested_errors(const CraneModel& from,

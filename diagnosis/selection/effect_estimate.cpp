@@ -296,13 +296,11 @@ class Estimator {
         // the bound on which a parameter lies that the logs do not determine says nothing
         if (parameter.choice || is_absent(parameter, e.values[p]) || !value_is_determined(e, p))
           continue;
-        const double span = parameter.upper - parameter.lower, v = e.values[p];
-        if (v > parameter.lower + kOnBound * span && v < parameter.upper - kOnBound * span)
-          continue;
+        if (!lies_on_bound(parameter, e.values[p])) continue;
         out.notes.push_back(fmt::format(
             "{} of {} lies on the bound of its plausible range, {} {}: another effect may act, "
             "or it does not act at all",
-            parameter.name, e.key(base_.machine), plain_number(v / parameter.si, 4),
+            parameter.name, e.key(base_.machine), plain_number(e.values[p] / parameter.si, 4),
             parameter.unit));
       }
     }

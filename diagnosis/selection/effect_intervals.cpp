@@ -169,6 +169,11 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
   }
 }
 
+bool lies_on_bound(const EffectParameter& parameter, double value) {
+  const double margin = kOnBound * (parameter.upper - parameter.lower);
+  return value <= parameter.lower + margin || value >= parameter.upper - margin;
+}
+
 bool value_is_determined(const AppliedEffect& effect, std::size_t p) {
   return p >= effect.lower95.size() ||
          is_determined(effect.values[p], effect.lower95[p], effect.upper95[p],

@@ -18,6 +18,9 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
 /// Whether the logs determine the value of parameter `p` of an effect (is_determined); true where it has no interval.
 bool value_is_determined(const AppliedEffect& effect, std::size_t p);
 
+/// Whether a value lies on a bound of its parameter's plausible range.
+bool lies_on_bound(const EffectParameter& parameter, double value);
+
 /// All parameters in the order of info().parameters, from the linear and the nonlinear (`shape`) ones. [SI]
 std::vector<double> parameter_values(const Effect& effect, const Eigen::VectorXd& linear,
                                      const std::vector<double>& shape);

@@ -2,11 +2,13 @@
 /// no part in its estimate, one that is not there does not, and what the laws learned before plays no part.
 #include "diagnosis/extension/error_beside_laws.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "diagnosis/evidence/left_out_rows.h"
+#include "diagnosis/extension/extend.h"
 #include "diagnosis/extension/refit_context.h"
 #include "identification/learning/fit.h"
 #include "models/effects/registry.h"
@@ -28,7 +30,8 @@ class ErrorBesideLaws : public ::testing::Test {
     const RefitContext context(by, logs, options);
     const EffectAt effect = parse_effect(key, machine);
     return context.pressure_change(effect, by, context.cross_validated(by, {}, {}),
-                                   context.cross_validated(by, {effect}, {}));
+                                   context.cross_validated(by, {effect}, {}))
+        .ratio;
   }
 
   const Machine machine = drawn_machine("loader_crane");
@@ -41,6 +44,25 @@ class ErrorBesideLaws : public ::testing::Test {
 TEST_F(ErrorBesideLaws, FallsByAnEffectThatIsThere) {
   EXPECT_LT(change("pump_lag:main", model), 0.9);
   EXPECT_GT(change("line_loss:boom", model), 0.98);
+}
+
+/// Effects that `improve` ends with where the diagnosis, which asks for more than all evidence, names nothing.
+std::vector<std::string> improved(const Machine& machine, const Log& log) {
+  ExtendOptions options;
+  options.diagnose.search.least_gain = 1e9;
+  options.diagnose.candidates = {parse_effect("pump_lag:main", machine),
+                                 parse_effect("line_loss:boom", machine),
+                                 parse_effect("coulomb_friction:boom", machine)};
+  std::vector<std::string> keys;
+  const ExtendResult r = improve(fit(machine, {log}).model, {{log}, {}, {}}, options);
+  for (const AppliedEffect& e : r.model.effects) keys.push_back(e.key(machine));
+  return keys;
+}
+
+TEST_F(ErrorBesideLaws, LetsAnEffectInThatNoDiagnosisNamed) {
+  EXPECT_THAT(improved(machine, hidden.train), ::testing::ElementsAre("pump_lag:main"));
+  const HiddenCase nothing = hidden_case(machine, {}, {7, 100.0});
+  EXPECT_THAT(improved(machine, nothing.train), ::testing::IsEmpty());
 }
 
 TEST_F(ErrorBesideLaws, DoesNotDependOnTheLearnedPressures) {
@@ -56,6 +78,8 @@ TEST_F(ErrorBesideLaws, IsTheRatioOfTheSquaresLeft) {
   // twice the residual in one channel of which all rows are the same, with a baseline of ones
   Evidence before, after;
   before.suspects = after.suspects = 1;
+  before.series.resize(1);
+  before.series[0].time = Eigen::VectorXd::LinSpaced(10, 0.0, 9.0);
   EvidenceChannel c;
   c.kind = EvidenceKind::kReturnLine;
   c.y = Eigen::Vector4d(1.0, -1.0, 2.0, -2.0);
@@ -66,15 +90,15 @@ TEST_F(ErrorBesideLaws, IsTheRatioOfTheSquaresLeft) {
   before.channels = {c};
   c.y = 2.0 * c.y.array() + 7.0;  // the law takes the constant over
   after.channels = {c};
-  EXPECT_NEAR(errors_beside_laws(before, after).change(0.0), 2.0, 1e-12);
-  EXPECT_NEAR(errors_beside_laws(after, before).change(0.0), 0.5, 1e-12);
-  EXPECT_EQ(errors_beside_laws(before, before).change(0.02), 1.0);
+  EXPECT_NEAR(errors_beside_laws(before, after, 8.0).change(0.0).ratio, 2.0, 1e-12);
+  EXPECT_NEAR(errors_beside_laws(after, before, 8.0).change(0.0).ratio, 0.5, 1e-12);
+  EXPECT_EQ(errors_beside_laws(before, before, 8.0).change(0.02).ratio, 1.0);
   // the third row is in one of both only: of 1, -1, -2 there remain the squares 25/9, 1/9 and 16/9
   after.channels[0].sample = {0, 1, 9, 3};
-  const PressureErrors common = errors_beside_laws(before, after);
+  const PressureErrors common = errors_beside_laws(before, after, 8.0);
   ASSERT_EQ(common.channels.size(), 1u);
-  EXPECT_EQ(common.channels[0].rows, 3.0);
-  EXPECT_NEAR(common.channels[0].before, 42.0 / 9.0, 1e-12);
+  EXPECT_EQ(common.channels[0].all().rows, 3.0);
+  EXPECT_NEAR(common.channels[0].all().before, 42.0 / 9.0, 1e-12);
 }
 
 TEST_F(ErrorBesideLaws, RowsLeftOutTakeEverythingOfThemAway) {
