@@ -77,9 +77,11 @@ TEST_F(ErrorBesideLaws, DoesNotDependOnTheLearnedPressures) {
 TEST_F(ErrorBesideLaws, IsTheRatioOfTheSquaresLeft) {
   // twice the residual in one channel of which all rows are the same, with a baseline of ones
   Evidence before, after;
-  before.suspects = after.suspects = 1;
-  before.series.resize(1);
-  before.series[0].time = Eigen::VectorXd::LinSpaced(10, 0.0, 9.0);
+  for (Evidence* e : {&before, &after}) {
+    e->suspects = 1;
+    e->series.resize(1);
+    e->series[0].time = Eigen::VectorXd::LinSpaced(10, 0.0, 9.0);
+  }
   EvidenceChannel c;
   c.kind = EvidenceKind::kReturnLine;
   c.y = Eigen::Vector4d(1.0, -1.0, 2.0, -2.0);
