@@ -46,7 +46,8 @@ TEST_F(CrossValidation, AChangeOfOneEffectGivesTheErrorsOfAWholeEstimate) {
   const CrossValidated changed =
       context.cross_validated(both, {viscous, leak}, {friction, viscous}, {});
   ASSERT_EQ(changed.models.size(), 4u);
-  for (std::size_t f = 0; f < changed.models.size(); ++f) {  // the leak shows in the flow alone and keeps its value
+  for (std::size_t f = 0; f < changed.models.size();
+       ++f) {  // the leak shows in the flow alone and keeps its value
     ASSERT_EQ(changed.models[f].effects.size(), 2u);
     EXPECT_EQ(changed.models[f].effects[1].values, both.models[f].effects[1].values);
   }

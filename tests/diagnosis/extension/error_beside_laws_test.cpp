@@ -29,8 +29,9 @@ class ErrorBesideLaws : public ::testing::Test {
   double change(const char* key, const CraneModel& by) const {
     const RefitContext context(by, logs, options);
     const EffectAt effect = parse_effect(key, machine);
-    return context.pressure_change(effect, by, context.cross_validated(by, {}, {}),
-                                   context.cross_validated(by, {effect}, {}))
+    return context
+        .pressure_change(effect, by, context.cross_validated(by, {}, {}),
+                         context.cross_validated(by, {effect}, {}))
         .ratio;
   }
 
