@@ -206,9 +206,11 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
           keep_round(options.journal, ++rounds, round);
       }
     }
-    improvement.add_to_pressures(part(0.3));
-    improvement.exchange(part(0.3));
-    improvement.test_again(part(0.5));
+    improvement.add_to_pressures(part(0.4));
+    done += (1.0 - done) * 0.4;
+    improvement.exchange(part(0.6));
+    done += (1.0 - done) * 0.6;
+    improvement.test_again(part(1.0));
   } catch (const Interruption&) {  // what was kept so far stays
     result.interrupted = true;
     result.reason = "it was interrupted";

@@ -72,6 +72,15 @@ bool stands_before(const EffectAt& a, const EffectAt& b) {
   return false;
 }
 
+/// Progress of the `done`-th of `count` equal parts of a task.
+SearchProgress part_of(const SearchProgress& all, std::size_t done, std::size_t count,
+                       const std::string& task) {
+  if (!all) return {};
+  return [=, &all](double share, const std::string&) {
+    all((static_cast<double>(done) + share) / static_cast<double>(count), task);
+  };
+}
+
 std::vector<EffectAt> without(std::vector<EffectAt> list, const EffectAt& e) {
   std::erase(list, e);
   return list;
@@ -134,12 +143,14 @@ std::vector<Improvement::Exchange> Improvement::possible_exchanges(
   const std::vector<EffectAt>& asked = context_.options().diagnose.candidates;
   const std::vector<EffectAt> among = asked.empty() ? candidates(context_.machine()) : asked;
   std::vector<Exchange> out;
-  for (const EffectAt& e : added_) {
+  for (std::size_t i = 0; i < added_.size(); ++i) {
+    const EffectAt& e = added_[i];
     if (e.effect->info().stage != EffectStage::kForce) continue;
     for (const EffectAt& rival : confused_with(among, e)) {
       if (contains(joint.all, rival)) continue;
       Exchange tried{e, rival};
-      const std::optional<CompareResult> errors = errors_after(joint, tried, progress);
+      const std::optional<CompareResult> errors = errors_after(
+          joint, tried, part_of(progress, i, added_.size(), "effects that are confused"));
       if (!errors) continue;
       const ErrorChange change = error_change(context_.machine(), joint.measured.errors, *errors,
                                               {{"force"}, ""}, context_.options().change);
@@ -182,8 +193,10 @@ void Improvement::add_to_pressures(const SearchProgress& progress) {
     const Joint j = joint({places_of(current_.model.effects), {}, nullptr}, progress);
     std::optional<EffectAt> best;
     double least = 1.0 / refit_moves;
-    for (const EffectAt& e : open) {
-      const PressureChange change = change_with(j, e, progress);
+    for (std::size_t i = 0; i < open.size(); ++i) {
+      const EffectAt& e = open[i];
+      const PressureChange change = change_with(
+          j, e, part_of(progress, i, open.size(), "effects on pressures that are not named"));
       if (tracing() && change.ratio != 1.0)
         fmt::print(stderr, "with {}: pressure error {:.4f} times, {:.2f} deviations\n",
                    effect_key(e.effect->info(), context_.machine(), e.at), change.ratio,
