@@ -79,6 +79,9 @@ sparflow_require("OMPL" libompl-dev OMPL_INCLUDE AND OMPL_LIBRARY)
 find_path(MATIO_INCLUDE matio.h)
 find_library(MATIO_LIBRARY matio)
 sparflow_require("matio" libmatio-dev MATIO_INCLUDE AND MATIO_LIBRARY)
+# matio reads MAT v7.3 by HDF5; plain HDF5 files are read by the same library, whose header has its own path in Debian.
+find_library(HDF5_LIBRARY NAMES hdf5_serial hdf5)
+sparflow_require("HDF5" libhdf5-dev HDF5_LIBRARY)
 find_path(NLOPT_INCLUDE nlopt.h)
 find_library(NLOPT_LIBRARY nlopt)
 sparflow_require("NLopt" libnlopt-dev NLOPT_INCLUDE AND NLOPT_LIBRARY)
@@ -119,7 +122,7 @@ target_link_options(sparflow_ompl INTERFACE
 
 add_library(sparflow_matio INTERFACE)
 target_include_directories(sparflow_matio SYSTEM INTERFACE ${MATIO_INCLUDE})
-target_link_libraries(sparflow_matio INTERFACE ${MATIO_LIBRARY})
+target_link_libraries(sparflow_matio INTERFACE ${MATIO_LIBRARY} ${HDF5_LIBRARY})
 
 add_library(sparflow_nlopt INTERFACE)
 target_include_directories(sparflow_nlopt SYSTEM INTERFACE ${NLOPT_INCLUDE})

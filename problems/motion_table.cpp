@@ -20,6 +20,23 @@ std::string joint_column(const Joint& joint, const char* kind, const char* per) 
                      joint.type == JointType::kRevolute ? "rad" : "m", per);
 }
 
+/// Columns of a motion: time, positions, speeds, accelerations.
+std::vector<std::string> motion_columns(const Machine& machine) {
+  std::vector<std::string> names = {"t_s"};
+  for (const char* kind : {"q", "qd", "qdd"}) {
+    const char* per = kind[1] == '\0' ? "" : kind[2] == '\0' ? "_s" : "_s2";
+    for (const Joint& joint : machine.joints) names.push_back(joint_column(joint, kind, per));
+  }
+  return names;
+}
+
+/// @param values columns as motion_columns names them
+Trajectory motion_of(const Eigen::MatrixXd& values) {
+  const Eigen::Index n = (values.cols() - 1) / 3;
+  return {values.col(0), values.middleCols(1, n), values.middleCols(1 + n, n),
+          values.middleCols(1 + 2 * n, n)};
+}
+
 std::vector<std::string> split(const std::string& line) {
   std::vector<std::string> fields(1);
   for (const char c : line) {
@@ -54,11 +71,7 @@ std::vector<std::size_t> commanded_cylinders(const CraneModel& model) {
 
 std::string motion_header(const CraneModel& model) {
   const Machine& machine = model.machine;
-  std::string text = "t_s";
-  for (const char* kind : {"q", "qd", "qdd"}) {
-    const char* per = kind[1] == '\0' ? "" : kind[2] == '\0' ? "_s" : "_s2";
-    for (const Joint& joint : machine.joints) text += "," + joint_column(joint, kind, per);
-  }
+  std::string text = fmt::format("{}", fmt::join(motion_columns(machine), ","));
   for (const Cylinder& c : machine.cylinders) text += fmt::format(",Q_{}_lpm", c.name);
   for (const Cylinder& c : machine.cylinders) text += fmt::format(",P_{}_bar", c.name);
   for (const Pump& p : machine.pumps) text += fmt::format(",p_{}_bar", p.name);
@@ -192,14 +205,9 @@ Trajectory load_motion(const std::string& path, const Machine& machine) {
         {path, 1, 0}, name,
         "column is missing" + (near.empty() ? std::string() : "; did you mean \"" + near + "\"?"));
   };
-  std::vector<std::size_t> columns = {column("t_s")};
-  for (const char* kind : {"q", "qd", "qdd"}) {
-    const char* per = kind[1] == '\0' ? "" : kind[2] == '\0' ? "_s" : "_s2";
-    for (const Joint& joint : machine.joints)
-      columns.push_back(column(joint_column(joint, kind, per)));
-  }
-  const auto rows = static_cast<Eigen::Index>(lines.size() - 1),
-             n = static_cast<Eigen::Index>(machine.joints.size());
+  std::vector<std::size_t> columns;
+  for (const std::string& name : motion_columns(machine)) columns.push_back(column(name));
+  const auto rows = static_cast<Eigen::Index>(lines.size() - 1);
   Eigen::MatrixXd values(rows, static_cast<Eigen::Index>(columns.size()));
   for (Eigen::Index r = 0; r < rows; ++r) {
     const std::vector<std::string> fields = split(lines[static_cast<std::size_t>(r) + 1]);
@@ -221,8 +229,49 @@ Trajectory load_motion(const std::string& path, const Machine& machine) {
                        "time must increase from row to row");
     }
   }
-  return {values.col(0), values.middleCols(1, n), values.middleCols(1 + n, n),
-          values.middleCols(1 + 2 * n, n)};
+  return motion_of(values);
+}
+
+Trajectory motion_from_columns(const std::string& name,
+                               const std::map<std::string, std::vector<double>>& columns,
+                               const Machine& machine) {
+  const std::vector<std::string> wanted = motion_columns(machine);
+  const auto found = [&](const std::string& column) -> const std::vector<double>& {
+    const auto it = columns.find(column);
+    if (it == columns.end()) throw InputError({name, 0, 0}, column, "column is missing");
+    return it->second;
+  };
+  const std::size_t rows = found("t_s").size();
+  if (rows < 2) throw InputError({name, 0, 0}, "t_s", "a motion needs at least two rows");
+  Eigen::MatrixXd values(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(wanted.size()));
+  for (std::size_t c = 0; c < wanted.size(); ++c) {
+    const std::vector<double>& column = found(wanted[c]);
+    if (column.size() != rows) {
+      throw InputError({name, 0, 0}, wanted[c],
+                       fmt::format("{} values, but t_s has {}", column.size(), rows));
+    }
+    for (std::size_t r = 0; r < rows; ++r) {
+      if (!std::isfinite(column[r])) {
+        throw InputError({name, 0, 0}, wanted[c],
+                         fmt::format("got {} in row {}, expected a number", column[r], r + 1));
+      }
+      if (c == 0 && r > 0 && column[r] <= column[r - 1]) {
+        throw InputError({name, 0, 0}, "t_s",
+                         fmt::format("time must increase from row to row; it goes from {} to {} s "
+                                     "in row {}",
+                                     column[r - 1], column[r], r + 1));
+      }
+      values(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = column[r];
+    }
+  }
+  return motion_of(values);
+}
+
+bool names_speeds(const std::string& header, const Machine& machine) {
+  return std::all_of(machine.joints.begin(), machine.joints.end(), [&](const Joint& j) {
+    return header.find(joint_column(j, "qd", "_s")) != std::string::npos &&
+           header.find(joint_column(j, "qdd", "_s2")) != std::string::npos;
+  });
 }
 
 }  // namespace sparflow

@@ -1,6 +1,8 @@
 #pragma once
 /// Motion file (CSV): a motion with its flows, pressures and power by the exact law.
+#include <map>
 #include <string>
+#include <vector>
 
 #include "models/chain/crane_model.h"
 #include "models/machine/trajectory.h"
@@ -29,5 +31,13 @@ Trajectory at_rate(const Trajectory& motion, double rate);
 /// Reads a motion (t, q, qd, qdd; other columns are ignored).
 /// @throws InputError with line and column name
 Trajectory load_motion(const std::string& path, const Machine& machine);
+
+/// The same of columns in memory. @param name of the motion in messages  @throws InputError with column name and row
+Trajectory motion_from_columns(const std::string& name,
+                               const std::map<std::string, std::vector<double>>& columns,
+                               const Machine& machine);
+
+/// Whether the header of a table names a speed and an acceleration of every joint, as motion files do.
+bool names_speeds(const std::string& header, const Machine& machine);
 
 }  // namespace sparflow

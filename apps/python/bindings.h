@@ -30,6 +30,8 @@ std::vector<std::string> pump_names(const Machine& machine);
 
 /// Logs given as one log, a path, or a sequence of these. Warnings of files that are read become Python's.
 std::vector<Log> logs_from(const py::object& given, const Machine& machine);
+/// Columns of numbers by their names. @throws TypeError for one that is no array of one dimension
+std::vector<LogColumn> columns_from(const py::dict& columns);
 /// A path given as text or as os.PathLike.
 std::string path_from(const py::object& given);
 /// The effects of the user's own, as objects or paths of YAML files, added to the model.

@@ -20,20 +20,7 @@ std::shared_ptr<Log> telling(Log&& log) {
 
 std::shared_ptr<Log> log_from_arrays(const py::dict& columns, const Machine& machine,
                                      const std::string& name, const py::object& mapping) {
-  std::vector<LogColumn> given;
-  given.reserve(columns.size());
-  for (const auto& [key, value] : columns) {
-    const auto values =
-        py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
-    const std::string column = py::cast<std::string>(py::str(key));
-    if (!values || values.ndim() != 1) {
-      PyErr_Clear();
-      throw py::type_error(
-          fmt::format("column {}: expected an array of one dimension that holds numbers", column));
-    }
-    given.push_back({column, {values.data(), values.data() + values.size()}});
-  }
-  return telling(log_from_columns(name, std::move(given), machine, options_with(mapping)));
+  return telling(log_from_columns(name, columns_from(columns), machine, options_with(mapping)));
 }
 
 std::vector<std::string> signal_names(const Log& log) {
@@ -115,6 +102,23 @@ void bind_signals(py::module_& m) {
 }
 
 }  // namespace
+
+std::vector<LogColumn> columns_from(const py::dict& columns) {
+  std::vector<LogColumn> given;
+  given.reserve(columns.size());
+  for (const auto& [key, value] : columns) {
+    const auto values =
+        py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(value);
+    const std::string column = py::cast<std::string>(py::str(key));
+    if (!values || values.ndim() != 1) {
+      PyErr_Clear();
+      throw py::type_error(
+          fmt::format("column {}: expected an array of one dimension that holds numbers", column));
+    }
+    given.push_back({column, {values.data(), values.data() + values.size()}});
+  }
+  return given;
+}
 
 void bind_log(py::module_& m) {
   py::class_<Log, std::shared_ptr<Log>>(

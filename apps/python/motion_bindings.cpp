@@ -4,6 +4,8 @@
 #include "apps/python/long_call.h"
 #include "apps/python/motion.h"
 #include "apps/python/result.h"
+#include "apps/tasks/argument_range.h"
+#include "apps/tasks/evaluate_task.h"
 #include "apps/tasks/optimize_task.h"
 #include "problems/motion_table.h"
 #include "problems/problem_file.h"
@@ -65,6 +67,27 @@ class Optimum final : public Result {
   Optimized found_;
 };
 
+class Priced final : public Result {
+ public:
+  Priced(Task task, Evaluated done) : task_(std::move(task)), done_(std::move(done)) {}
+  std::string json() const override {
+    return evaluation_json(task_->model, done_.problem, done_.evaluation);
+  }
+  std::string text() const override {
+    return evaluation_table(task_->model, done_.problem, done_.evaluation);
+  }
+  std::string headline() const override { return page().headline(); }
+  Page page() const override {
+    return evaluation_page(task_->model, done_.problem, done_.evaluation);
+  }
+  std::string csv(double rate) const { return evaluated_csv(task_->model, done_, rate); }
+  const Evaluated& done() const { return done_; }
+
+ private:
+  Task task_;
+  Evaluated done_;
+};
+
 std::shared_ptr<Planned> plan_paths(const Problem& problem, const py::dict& a) {
   SeedOptions options;
   options.count = a["paths"].cast<int>();
@@ -107,6 +130,67 @@ std::shared_ptr<Optimum> optimize_motion(const Problem& problem, const py::dict&
   if (r.status == OptimizeStatus::kFailed)
     raise_unsolved("NotConvergedError", r.message, py::cast(result));
   return result;
+}
+
+OwnMotion motion_from(const py::object& given, const Machine& machine, const std::string& mapping) {
+  if (py::isinstance<Trajectory>(given))
+    return own_motion("trajectory", given.cast<const Trajectory&>(), machine);
+  if (py::isinstance<Log>(given)) return own_motion(given.cast<const Log&>(), machine);
+  if (py::isinstance<py::dict>(given))
+    return own_motion("columns", columns_from(given.cast<py::dict>()), machine, mapping);
+  return load_own_motion(path_from(given), machine, mapping, {warn, warn, {}, {}});
+}
+
+/// @param problem null: the machine's own limits judge
+std::shared_ptr<Priced> price_motion(const Problem* problem,
+                                     const std::shared_ptr<CraneModel>& model, const py::dict& a) {
+  Task both;
+  if (problem != nullptr) {
+    if (!problem->has_model) throw no_model();
+    both = problem->task;
+  } else {
+    both = std::make_shared<ProblemAndModel>(ProblemAndModel{{}, *model});
+  }
+  EvaluateTask task;
+  task.verb = "price";
+  if (!a["payload_kg"].is_none()) {
+    task.payload = a["payload_kg"].cast<double>();
+    require_range("price: --payload", task.payload, 0.0, 1e6);
+  }
+  auto motion = std::make_shared<OwnMotion>(
+      motion_from(a["motion"], both->model.machine, a["mapping"].cast<std::string>()));
+  const bool by_problem = problem != nullptr;
+  return long_call<Priced>(py::none(), [both, task, motion, by_problem](const Listener&) {
+    return std::make_shared<Priced>(
+        both, evaluate_task(both->model, by_problem ? &both->problem : nullptr, std::move(*motion),
+                            task));
+  });
+}
+
+void bind_price(py::module_& m) {
+  py::class_<Priced, Result, std::shared_ptr<Priced>>(m, "PriceResult",
+                                                      "A motion of one's own and what it costs.")
+      .def_property_readonly(
+          "energy_exact_J", [](const Priced& p) { return p.done().evaluation.energy.total; },
+          "[J] by the exact law")
+      .def_property_readonly(
+          "duration_s", [](const Priced& p) { return p.done().evaluation.motion.duration(); },
+          "[s] of the motion")
+      .def_property_readonly(
+          "payload_kg", [](const Priced& p) { return p.done().problem.payload; },
+          "[kg] that it is priced with")
+      .def_property_readonly(
+          "limits_kept", [](const Priced& p) { return limits_kept(p.done().evaluation); },
+          "Whether every limit is kept, by the measure of optimize.")
+      .def_property_readonly(
+          "notes", [](const Priced& p) { return p.done().evaluation.notes; },
+          "What was found by smoothing, left out or missing, sentences.")
+      .def_property_readonly(
+          "motion", [](const Priced& p) -> const Trajectory& { return p.done().evaluation.motion; },
+          py::return_value_policy::reference_internal, "The motion that was priced, a Trajectory.")
+      .def("motion_csv", &Priced::csv, py::arg("rate") = 0.0,
+           "The text that `-o MOTION.csv` writes; rate [Hz], 0 is as in the motion.");
+  m.def("price", &price_motion);
 }
 
 }  // namespace
@@ -175,6 +259,7 @@ void bind_motion(py::module_& m) {
            "The text that `-o MOTION.csv` writes; rate [Hz], 0 is the mesh of the solve.");
   m.def("plan", &plan_paths);
   m.def("optimize", &optimize_motion);
+  bind_price(m);
 }
 
 }  // namespace sparflow::python

@@ -9,6 +9,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "identification/log/log_dialect.h"
 #include "identification/log/mat_file.h"
@@ -131,8 +132,11 @@ MatValue from_matio(matvar_t* variable, int depth, const DoorLimits& limits) {
   return value;
 }
 
+constexpr std::string_view kHdf5 = "\x89HDF\r\n";  // no threshold: mark of the format
+
 /// The variables of a file of version 7.3. @throws InputError when HDF5 cannot open it
-std::vector<MatValue> read_mat_73(const std::string& path, const DoorLimits& limits) {
+std::vector<MatValue> read_mat_73(const std::string& path, std::string_view bytes,
+                                  const DoorLimits& limits) {
   static const bool quiet = [] {  // the library would write its own messages to stderr
     Mat_LogInitFunc("sparflow", [](int, char*) {});
     return true;
@@ -140,8 +144,12 @@ std::vector<MatValue> read_mat_73(const std::string& path, const DoorLimits& lim
   static_cast<void>(quiet);
   const std::unique_ptr<mat_t, CloseFile> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
   if (!file) {
-    throw InputError({path, 0, 0}, "",
-                     "cannot be read as a MATLAB file; save it again, e.g. save('log.mat', '-v7')");
+    const bool hdf5 = bytes.starts_with(kHdf5) || bytes.starts_with("MATLAB 7.3 MAT-file");
+    throw InputError(
+        {path, 0, 0}, "",
+        fmt::format("found {}, expected a MATLAB file (v4 to v7.3) or vectors at the root of an "
+                    "HDF5 file; save it again, e.g. save('log.mat', '-v7')",
+                    hdf5 ? "an HDF5 file that was cut or damaged" : "neither header"));
   }
   std::vector<MatValue> variables;
   while (const Variable variable{Mat_VarReadNext(file.get())}) {
@@ -228,7 +236,8 @@ class MatlabReader {
     if (name.starts_with('#')) return;  // internal to the library
     if (name == "names") {
       names_ = read_names(variable);
-      if (names_.empty()) fail(name, "expected a cell array of char, or a char matrix");
+      if (names_.empty())
+        fail(name, "expected a cell array of char, a char matrix, or text in HDF5");
       return;
     }
     if (variable.kind == MatValue::Kind::kNumbers) {
@@ -318,14 +327,19 @@ class MatlabReader {
 
 bool is_matlab(std::string_view bytes, const std::string& path) {
   return bytes.starts_with("MATLAB 5.0 MAT-file") || bytes.starts_with("MATLAB 7.3 MAT-file") ||
-         bytes.starts_with("\x89HDF\r\n") || path.ends_with(".mat");
+         bytes.starts_with(kHdf5) || path.ends_with(".mat");
 }
 
 RawTable read_matlab(const std::string& path, std::string_view bytes, const DoorLimits& limits) {
   const bool before = is_mat_before_73(bytes);
-  RawTable table =
-      MatlabReader(path, before ? read_mat(bytes, path, limits) : read_mat_73(path, limits)).read();
-  table.dialect = before ? "MATLAB" : "MATLAB v7.3";
+  std::optional<std::vector<MatValue>> plain;
+  if (!before) plain = read_plain_hdf5(path, limits);
+  const char* dialect = before ? "MATLAB" : plain ? "HDF5" : "MATLAB v7.3";
+  std::vector<MatValue> variables = before  ? read_mat(bytes, path, limits)
+                                    : plain ? std::move(*plain)
+                                            : read_mat_73(path, bytes, limits);
+  RawTable table = MatlabReader(path, std::move(variables)).read();
+  table.dialect = dialect;
   return table;
 }
 

@@ -10,7 +10,8 @@ import sparflow
 STUB = ast.parse((pathlib.Path(sparflow.__file__).parent / "__init__.pyi").read_text())
 # Methods of Python itself that the stubs name because they say how an object is used.
 SPECIAL = {"__getitem__", "__contains__", "__len__", "__init__", "__call__", "_repr_html_", "__add__", "__radd__", "__sub__",
-           "__rsub__", "__mul__", "__rmul__", "__truediv__", "__rtruediv__", "__pow__", "__neg__", "__abs__"}
+           "__rsub__", "__mul__", "__rmul__", "__truediv__", "__rtruediv__", "__pow__", "__neg__", "__pos__", "__abs__", "__gt__", "__ge__",
+           "__lt__", "__le__"}
 ALIASES = {"Array", "Flags", "Path", "Progress", "State", "Levers", "Controller", "Logs", "Effects"}
 
 
@@ -91,6 +92,13 @@ def test_classes_have_the_stubs_members():
                 assert [a[0] for a in arguments(definition)] == names_in_docstring(callable_), (name, member)
 
 
+def test_every_operator_of_a_formula_stands_in_its_stub():
+    # Those that only refuse (a branch, a number) or serve NumPy say nothing of how a formula is used.
+    others = {"__init__", "__repr__", "__bool__", "__float__", "__array_ufunc__", "__array_function__"}
+    own = {name for name, member in vars(sparflow.Formula).items() if inspect.isfunction(member)} - others
+    assert own == set(functions(classes()["Formula"].body)) - others and {"__pos__", "__gt__", "__le__"} <= own
+
+
 def test_everything_public_is_explained_in_words_of_python():
     for name in module_names():
         thing = getattr(sparflow, name)
@@ -110,6 +118,6 @@ def test_everything_public_is_explained_in_words_of_python():
 
 
 def test_units_stand_where_numbers_do():
-    for name, unit in dict(plan=r"\[s\]", simulate=r"\[s\].*\[Hz\]", audit=r"\[kg\].*\[s\]", evaluate=r"\[m/s\].*\[N\].*\[W\]",
+    for name, unit in dict(plan=r"\[s\]", price=r"\[kg\]", simulate=r"\[s\].*\[Hz\]", audit=r"\[kg\].*\[s\]", evaluate=r"\[m/s\].*\[N\].*\[W\]",
                            pareto=r"\[kW\]", strategies=r"\[kW\]", benchmark=r"\[s\]").items():
         assert re.search(unit, inspect.getdoc(getattr(sparflow, name)), re.DOTALL), name

@@ -16,7 +16,7 @@ from ._errors import (DefectError, Error, InfeasibleError, InputError, Interrupt
 from ._sparflow import *  # noqa: F401,F403
 from ._sparflow import __version__
 from ._verbs import (audit, benchmark, compare, derivatives, diagnose, evaluate, extend, fit, improve, loop_of_trust, optimize,
-                     pareto, plan, propose_mapping, selftest, simulate, strategies)
+                     pareto, plan, price, propose_mapping, selftest, simulate, strategies)
 from . import _frames
 
 _frames.attach()

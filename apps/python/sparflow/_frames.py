@@ -131,12 +131,8 @@ def log_frame(self):
     return frame
 
 
-def log_from_frame(frame, machine, name="frame", mapping=None):
-    """Makes a log of a DataFrame whose columns are named as in a file, with units ('t_s', 'q_boom_rad', ...).
-
-    An index named 't_s' serves as that column. Columns without a unit in their names have that of `frame.attrs["units"]`, as
-    Log.to_frame writes it. Raises InputError.
-    """
+def columns_of(frame, name):
+    """The columns of a DataFrame as arrays of floats, named as in a file."""
     if len(frame) == 0:
         raise InputError(f"{name}: the frame has no rows; expected at least two samples")
     units = {label: _SUFFIXES.get(unit, unit) for label, unit in frame.attrs.get("units", {}).items() if unit}
@@ -150,7 +146,16 @@ def log_from_frame(frame, machine, name="frame", mapping=None):
         if numbers is not None:
             unit = units.get(str(label))
             columns[f"{label}_{unit}" if unit else str(label)] = numbers
-    return core.Log.from_arrays(columns, machine, name, mapping)
+    return columns
+
+
+def log_from_frame(frame, machine, name="frame", mapping=None):
+    """Makes a log of a DataFrame whose columns are named as in a file, with units ('t_s', 'q_boom_rad', ...).
+
+    An index named 't_s' serves as that column. Columns without a unit in their names have that of `frame.attrs["units"]`, as
+    Log.to_frame writes it. Raises InputError.
+    """
+    return core.Log.from_arrays(columns_of(frame, name), machine, name, mapping)
 
 
 def _numbers(column, name):
@@ -182,6 +187,7 @@ def attach():
     core.Selftest.to_frame = selftest_frame
     core.PlanResult.to_frame = plan_frame
     core.OptimizeResult.to_frame = motion_frame
+    core.PriceResult.to_frame = motion_frame
     core.StrategiesResult.to_frame = strategies_frame
     core.ParetoResult.to_frame = pareto_frame
     core.AuditResult.to_frame = audit_frame

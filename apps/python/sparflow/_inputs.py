@@ -1,8 +1,10 @@
 """What the functions accept: an object or the path of its file, numbers in their ranges; a sentence for anything else."""
 
+import collections.abc
 import numbers
 import os
 
+from . import _frames
 from . import _sparflow as core
 from ._errors import UsageError
 
@@ -52,3 +54,15 @@ def logs(given, machine, mapping):
         return given
     given = [given] if isinstance(given, (core.Log, str, os.PathLike)) else list(given)
     return [g if isinstance(g, core.Log) else core.Log.load(g, machine, mapping) for g in given]
+
+
+def motion(given):
+    """A motion as the library takes it: a Trajectory, a Log, a path, or columns by their names."""
+    if isinstance(given, (core.Trajectory, core.Log, str, os.PathLike, dict)):
+        return given
+    if hasattr(given, "columns"):
+        return _frames.columns_of(given, "frame")
+    if isinstance(given, collections.abc.Mapping):
+        return dict(given)
+    raise UsageError("price: expected a Trajectory, a Log, a DataFrame, arrays by column name, or the path of a motion or log; "
+                     f"got {given!r}")

@@ -118,6 +118,34 @@ def optimize(problem, *, bound=False, start_from=None, paths=8, seconds=5.0, see
         intervals=intervals, processes=processes, progress=progress))
 
 
+def price(motion, *, model=None, problem=None, payload_kg=None, mapping=None):
+    """Prices a motion of your own by the exact law, as the verb `evaluate`: energy, losses, limits; returns a PriceResult.
+
+    motion: the path of a motion or log, a Trajectory, a Log, a DataFrame, or arrays by column name. Columns are those of a file:
+    't_s' [s] and either 'q_', 'qd_' and 'qdd_' of each joint ('q_boom_rad', 'qd_boom_rad_s', 'qdd_boom_rad_s2'; 'm' in place of
+    'rad' where it slides), which are taken as they are, or positions alone, 'q_boom_rad' or strokes 'x_boom_m': then speeds are
+    found by smoothing, and a rod slower than 2 mm/s stands. Of a Log only the positions are used.
+    model: a Model or the path of its file. problem: a Problem or the path of its file, whose limits, obstacles, payload, duration,
+    start and goal judge the motion; without one, the machine's own limits do. For the path of a problem, model replaces the one
+    that it names. payload_kg: payload [kg]; None is that of the problem or of the log.
+    mapping: path of a mapping file for other column names.
+    A limit that is broken is no exception: see `limits_kept` and `to_dict()["limits"]`.
+    Raises InputError where the motion cannot be read, UsageError without a model and for a Trajectory of another machine.
+    """
+    if problem is None and model is None:
+        raise UsageError("price: give model=, or problem= whose file names a model")
+    if model is not None:
+        model = _inputs.one("price", model, core.Model)
+    if isinstance(problem, core.Problem) and model is not None:
+        raise UsageError("price: give either model= or a Problem, which has its model; Problem.load(path, model) makes one with another")
+    if isinstance(problem, (str, os.PathLike)):
+        problem, model = core.Problem.load(problem, model), None
+    if problem is not None:
+        problem = _inputs.one("price", problem, core.Problem)
+    return core.price(problem, model, dict(motion=_inputs.motion(motion), payload_kg=payload_kg,
+                                           mapping="" if mapping is None else os.fspath(mapping)))
+
+
 def _several(given, one):
     return [given] if isinstance(given, one) else list(given)
 
