@@ -21,7 +21,7 @@ using testing::IsEmpty;
 constexpr std::size_t kRows = 60;
 const std::vector<std::string> kColumns = {"t_s", "q_boom_rad", "q_extension_m", "pA_boom_bar"};
 
-double written(std::size_t column, std::size_t row) {
+double value_at(std::size_t column, std::size_t row) {
   const auto x = static_cast<double>(row);
   return column == 0 ? 0.02 * x : column == 1 ? 0.5 + 1e-3 * x : column == 2 ? 1.5 : 80.0 + x;
 }
@@ -56,7 +56,7 @@ class Hdf5Writer {
   void vectors() const {
     for (std::size_t c = 0; c < kColumns.size(); ++c) {
       std::vector<double> values(kRows);
-      for (std::size_t k = 0; k < kRows; ++k) values[k] = written(c, k);
+      for (std::size_t k = 0; k < kRows; ++k) values[k] = value_at(c, k);
       numbers(kColumns[c].c_str(), {kRows}, values, H5T_IEEE_F64LE, c == 1);
     }
   }
@@ -87,7 +87,7 @@ class Hdf5Writer {
 std::vector<double> matrix() {
   std::vector<double> values;
   for (std::size_t k = 0; k < kRows; ++k)
-    for (std::size_t c = 0; c < kColumns.size(); ++c) values.push_back(written(c, k));
+    for (std::size_t c = 0; c < kColumns.size(); ++c) values.push_back(value_at(c, k));
   return values;
 }
 
@@ -97,9 +97,9 @@ class PlainHdf5 : public test::LogFiles {
     ASSERT_EQ(log.samples(), static_cast<Eigen::Index>(kRows));
     for (std::size_t k = 0; k < kRows; ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      EXPECT_DOUBLE_EQ(log.time[row], written(0, k));
-      EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[row], written(1, k));
-      EXPECT_DOUBLE_EQ(log.find(Role::kPressureA, 0)->values[row], written(3, k) * 1e5);
+      EXPECT_DOUBLE_EQ(log.time[row], value_at(0, k));
+      EXPECT_DOUBLE_EQ(log.find(Role::kJointPosition, 0)->values[row], value_at(1, k));
+      EXPECT_DOUBLE_EQ(log.find(Role::kPressureA, 0)->values[row], value_at(3, k) * 1e5);
     }
     EXPECT_EQ(log.dialect, "HDF5");
   }
