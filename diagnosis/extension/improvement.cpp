@@ -331,7 +331,7 @@ Improvement::Tested Improvement::without_one(const Joint& joint, const EffectAt&
   const double change = std::min(step.change.own, step.change.own_steady);
   const bool falls = change * options.change.refit_moves < 1.0;
   // A leak acts at rest, where no error of a motion shows it; what the diagnosis saw there stands.
-  const bool unseen = std::abs(std::log(step.change.own)) < options.unmoved;
+  const bool unseen = !learned && std::abs(std::log(step.change.own)) < options.unmoved;
   tested.stays = step.determined && (falls || unseen);
   if (!tested.stays || !joint.on_tests || learned) return tested;
   // Test logs do not choose an effect, but may contradict it.

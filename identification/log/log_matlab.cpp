@@ -149,7 +149,7 @@ std::vector<MatValue> read_mat_73(const std::string& path, std::string_view byte
         {path, 0, 0}, "",
         fmt::format("found {}, expected a MATLAB file (v4 to v7.3) or vectors at the root of an "
                     "HDF5 file; save it again, e.g. save('log.mat', '-v7')",
-                    hdf5 ? "an HDF5 file that was cut or damaged" : "neither header"));
+                    hdf5 ? "an HDF5 file that was cut or damaged" : "a header of another kind"));
   }
   std::vector<MatValue> variables;
   while (const Variable variable{Mat_VarReadNext(file.get())}) {
