@@ -66,6 +66,10 @@ bool is_nonlinear_in_parameter(const Effect& effect) {
          effect.info().parameters.size() == 1;
 }
 
+bool is_linearised(const Effect& effect) {
+  return is_nonlinear_in_parameter(effect) || effect.depends_on_size();
+}
+
 bool is_replaced_when_changed(const Effect& effect) {
   const std::vector<EffectParameter>& parameters = effect.info().parameters;
   return std::any_of(parameters.begin(), parameters.end(),
@@ -84,7 +88,8 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   Eigen::MatrixXd result;
   for (std::size_t log = first_log; log < last_log; ++log) {
     Eigen::MatrixXd raw;
-    if (!effect.effect->columns(series[log], {channel.kind, channel.index}, effect.at, shape, raw))
+    if (!effect.effect->columns(series[log], {channel.kind, channel.index, about}, effect.at, shape,
+                                raw))
       continue;
     if (where != ActingLogs::kAll) subtract_shared(log, effect, shape, channel, raw);
     if (chord) {

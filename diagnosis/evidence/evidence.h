@@ -57,6 +57,9 @@ struct EvidenceChannel {
 /// is nonlinear too, but is excluded: flows show its derivative alone, so it keeps the linearisation at its usual size.
 bool is_nonlinear_in_parameter(const Effect& effect);
 
+/// Whether the signature is a secant that depends on the size of the effect: an angle of the whole machine, a loss behind a valve.
+bool is_linearised(const Effect& effect);
+
 /// Whether a linear parameter that cannot be zero multiplies the whole law (a lag's share): another value of the effect then
 /// replaces the law, where that of other effects adds to it.
 bool is_replaced_when_changed(const Effect& effect);
@@ -81,8 +84,8 @@ struct Evidence {
   /// Signature: what one SI unit of each linear parameter adds to a channel, filtered like y; zero in logs in which the
   /// effect does not act.
   /// @param shape nonlinear parameters [SI]
-  /// @param about linear parameters [SI] at which a force that is nonlinear in them (an angle) is linearised by its
-  ///        secant from zero; empty: at their usual size
+  /// @param about linear parameters [SI] at which a quantity that is nonlinear in them (a force in an angle, a flow in a line's
+  ///        loss) is linearised by its secant from zero; empty: at their usual size
   /// @return [rows x linear parameters]; no columns when the effect does not act there
   Eigen::MatrixXd columns(const EffectAt& effect, std::span<const double> shape,
                           const EvidenceChannel& channel, std::span<const double> about = {},

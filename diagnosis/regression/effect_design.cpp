@@ -89,6 +89,7 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
   EffectDesign d;
   d.effect = effect;
   d.shape = std::move(shape);
+  d.about.assign(about.begin(), about.end());
   for (const EffectParameter& p : effect.effect->info().parameters) {
     if (!p.linear) continue;
     ++d.linear;

@@ -14,6 +14,7 @@ namespace sparflow {
 struct EffectDesign {
   EffectAt effect;
   std::vector<double> shape;             ///< [SI] nonlinear parameters
+  std::vector<double> about;             ///< [SI] see Evidence::columns
   std::vector<Eigen::MatrixXd> columns;  ///< [channels]: [rows x linear], or no columns
   std::vector<double> lower, upper;      ///< [SI] bounds of the linear parameters
   int linear = 0;                        ///< number of linear parameters

@@ -106,6 +106,7 @@ class Estimator {
       if (!correct_linearisation(found)) break;
       found = with_intervals();
     }
+    for (int secant = 0; secant < kChords && relinearise(found); ++secant) found = with_intervals();
     EffectEstimate out;
     out.log_likelihood = log_likelihood;
     out.effects = applied(found);
@@ -241,6 +242,22 @@ class Estimator {
       shape[s] = -found.value > at_start ? found.x : start;
       designs_[d] = make_design(evidence_, designs_[d].effect, std::move(shape));
     }
+  }
+
+  /// Secants at the values found, of effects whose signature is one. @return whether there is such an effect
+  bool relinearise(const std::vector<FoundEffect>& found) {
+    bool any = false;
+    for (std::size_t d = 0; d < designs_.size(); ++d) {
+      const Effect& effect = *designs_[d].effect.effect;
+      if (!effect.depends_on_size()) continue;
+      std::vector<double> about;
+      const std::vector<EffectParameter>& parameters = effect.info().parameters;
+      for (std::size_t p = 0; p < parameters.size(); ++p)
+        if (parameters[p].linear) about.push_back(found[d].values[p]);
+      designs_[d] = make_design(evidence_, designs_[d].effect, designs_[d].shape, about);
+      any = true;
+    }
+    return any;
   }
 
   /// @param machine whether to include effects that change the machine

@@ -40,7 +40,7 @@ class Search {
       bool reshaped = false;
       for (std::size_t i = 0; i < found.size(); ++i)
         reshaped = reshape(search_, found, i, current) || reshaped;
-      relinearise_angles(found, current);
+      relinearise(found, current);
       while (search_.mechanisms().enabled(Mechanism::kMerge) && merge(search_, found, current)) {
       }
       if (reshaped) {
@@ -150,18 +150,18 @@ class Search {
     }
   }
 
-  /// Linearises angles by the secant up to the value found. A tilt of three degrees reduces every weight by a
-  /// thousandth, which a linearisation at zero does not contain; the error would be named as a mass or another angle.
-  void relinearise_angles(std::vector<FoundEffect>& found, EffectFit& fit) const {
+  /// Linearises by the secant up to the values found. A tilt of three degrees reduces every weight by a thousandth, which a
+  /// linearisation at zero does not contain; the error would be named as a mass or another angle.
+  void relinearise(std::vector<FoundEffect>& found, EffectFit& fit) const {
     bool any = false;
     Eigen::Index first = 0;
     for (FoundEffect& f : found) {
-      const double about = fit.theta[first];
+      const std::span<const double> about(fit.theta.data() + first,
+                                          static_cast<std::size_t>(f.design.linear));
       first += f.design.linear;
-      if (!is_nonlinear_in_parameter(*f.design.effect.effect) || !lets(Mechanism::kAngles, true))
-        continue;
-      f.design = make_design(search_.evidence, f.design.effect, f.design.shape, {&about, 1},
-                             f.design.optional);
+      if (!is_linearised(*f.design.effect.effect) || !lets(Mechanism::kAngles, true)) continue;
+      f.design =
+          make_design(search_.evidence, f.design.effect, f.design.shape, about, f.design.optional);
       any = true;
     }
     if (lets(Mechanism::kAngles, any)) fit = search_.fit(designs_of(found), &fit);

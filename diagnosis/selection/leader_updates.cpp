@@ -30,7 +30,7 @@ std::vector<EffectDesign> rebuilt_designs(const Evidence& evidence,
   std::vector<EffectDesign> out;
   out.reserve(designs.size());
   for (const EffectDesign& d : designs)
-    out.push_back(make_design(evidence, d.effect, d.shape, {}, d.optional));
+    out.push_back(make_design(evidence, d.effect, d.shape, d.about, d.optional));
   return out;
 }
 

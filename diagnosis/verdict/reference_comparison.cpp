@@ -29,9 +29,10 @@ EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, Acti
   EffectDesign design = found;
   design.number = 0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c)
-    design.columns[c] = found.touches(c) ? evidence.columns(found.effect, found.shape,
-                                                            evidence.channels[c], {}, where)
-                                         : Eigen::MatrixXd();
+    design.columns[c] =
+        found.touches(c)
+            ? evidence.columns(found.effect, found.shape, evidence.channels[c], found.about, where)
+            : Eigen::MatrixXd();
   // the same law, with the same parameters absent
   for (Index k = 0; k < found.linear; ++k) {
     bool absent = true;

@@ -160,12 +160,27 @@ MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSe
 }
 
 MachineSeries with_passed_flows(const std::vector<AppliedEffect>& effects, MachineSeries series) {
-  for (CylinderSeries& c : series.cylinders) c.passed.resize(0);
   for (std::size_t i = 0; i < series.cylinders.size(); ++i) {
+    CylinderSeries& c = series.cylinders[i];
+    const int cylinder = static_cast<int>(i);
+    c.passed.resize(0);
+    c.passing = {};
     for (const AppliedEffect& e : effects) {
-      VectorXd passed = e.effect->passed_flow(series, static_cast<int>(i), e.at, e.values);
-      if (passed.size() > 0) series.cylinders[i].passed = std::move(passed);
+      VectorXd passed = e.effect->passed_flow(series, cylinder, e.at, e.values, {});
+      if (passed.size() == 0) continue;
+      c.passed = std::move(passed);
+      c.passing = {e.effect, e.at, e.values};
     }
+    if (c.passing.effect == nullptr) continue;
+    VectorXd lost;
+    for (const AppliedEffect& e : effects) {
+      const VectorXd one = e.effect->lost_behind_valve(series, cylinder, e.at, e.values);
+      if (one.size() == 0) continue;
+      lost = lost.size() == 0 ? one : VectorXd(lost + one);
+    }
+    if (lost.size() > 0)
+      c.passed =
+          c.passing.effect->passed_flow(series, cylinder, c.passing.at, c.passing.values, lost);
   }
   return series;
 }
@@ -185,7 +200,7 @@ VectorXd effect_series(const AppliedEffect& effect, const MachineSeries& log, Ev
     (law.info().parameters[p].linear ? linear : shape).push_back(effect.values[p]);
   }
   Eigen::MatrixXd columns;
-  if (!law.columns(log, {kind, index}, effect.at, shape, columns)) return {};
+  if (!law.columns(log, {kind, index, linear}, effect.at, shape, columns)) return {};
   SPARFLOW_CHECK(
       columns.cols() == static_cast<Index>(linear.size()) && columns.rows() == log.samples(),
       "an effect's columns have the wrong shape");

@@ -88,6 +88,8 @@ struct Instant {
 struct MeasuredQuantity {
   EvidenceKind kind;
   int index;  ///< cylinder, or pump where the kind is one of the pump
+  /// Linear parameters [SI] at which a signature holds that is not proportional to them; empty: at typical values.
+  std::span<const double> about = {};
 };
 
 class Effect {
@@ -143,8 +145,16 @@ class Effect {
                              Eigen::VectorXd& /*opening*/) const {}
 
   /// Share of a valve's flow [samples, -] that the measured pressure drop over its edge passes; empty: no such law.
+  /// @param lost [samples, Pa] pressure lost between valve and cylinder, which is no drop over the edge; empty: nothing
   virtual Eigen::VectorXd passed_flow(const MachineSeries& /*log*/, int /*cylinder*/, int /*at*/,
-                                      std::span<const double> /*p*/) const {
+                                      std::span<const double> /*p*/,
+                                      const Eigen::VectorXd& /*lost*/) const {
+    return {};
+  }
+  /// Pressure lost between a cylinder's valve and the chamber whose pressure is measured [samples, Pa]; empty: none. The flows are
+  /// those that the model's law of passed flows (CylinderSeries::passing) leaves.
+  virtual Eigen::VectorXd lost_behind_valve(const MachineSeries& /*log*/, int /*cylinder*/,
+                                            int /*at*/, std::span<const double> /*p*/) const {
     return {};
   }
 
@@ -171,6 +181,8 @@ class Effect {
   /// default is the parameter's own grid; limits and thresholds depend on the range of the log. Empty: the log lacks
   /// what the effect needs.
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
+  /// Whether columns() depend on the linear parameters (MeasuredQuantity::about): a secant, computed anew at the values found.
+  virtual bool depends_on_size() const { return false; }
   /// Whether columns() are computed from filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
   /// Whether columns() contain unfiltered measurements with their noise; they are comparable to filtered signals only

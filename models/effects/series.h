@@ -11,6 +11,15 @@
 
 namespace sparflow {
 
+class Effect;
+
+/// The law of a model that says which share of a valve's flow the pressure drop over its edge passes (Effect::passed_flow).
+struct PassedFlowLaw {
+  const Effect* effect = nullptr;  ///< null: the model has no such law
+  int at = -1;
+  std::vector<double> values;  ///< [SI] by parameter
+};
+
 struct CylinderSeries {
   Eigen::VectorXd length;        ///< [m] pin to pin
   Eigen::VectorXd rate;          ///< dx/dq [m/rad] or [-]
@@ -33,6 +42,7 @@ struct CylinderSeries {
   /// [-] share of the valve's flow that the measured pressure drop over its edge passes, by the model's law. What lowers the pump's
   /// pressure shows in it, and beside it in no flow. Empty: the model has no such law.
   Eigen::VectorXd passed;
+  PassedFlowLaw passing;  ///< the law of `passed`
   /// [Pa] pressures of the chambers, through the same filter as the position
   Eigen::VectorXd pressure_a, pressure_b;
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter

@@ -55,7 +55,7 @@ class ValvePressureDrop final : public Effect {
             "Q = Q_valve(u) (max(0, p_pump - p) / setting)^0.5, with a compensator at most "
             "Q_valve(u); p = pressure of the supply chamber",
         .signals = {"command", "position", "pump pressure", "chamber pressures"},
-        .confused_with = {"valve_lag", "flow_saturation", "pump_lag"},
+        .confused_with = {"line_loss", "valve_lag", "flow_saturation", "pump_lag"},
         .separated_by =
             "the same command alone and beside a cylinder of higher load; a step of "
             "the command from standby",
@@ -89,9 +89,10 @@ class ValvePressureDrop final : public Effect {
     return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
   }
   Eigen::VectorXd passed_flow(const MachineSeries& log, int cylinder, int at,
-                              std::span<const double> p) const override {
+                              std::span<const double> p,
+                              const Eigen::VectorXd& lost) const override {
     if (cylinder != at) return {};
-    const Eigen::VectorXd lacking = lacking_flow(log, at, p.subspan(1));
+    const Eigen::VectorXd lacking = lacking_flow(log, at, p.subspan(1), lost);
     return lacking.size() == 0 ? lacking : (1.0 - p[0] * lacking.array()).matrix();
   }
 
@@ -99,7 +100,8 @@ class ValvePressureDrop final : public Effect {
   /// Share of the valve's flow that the measured pressure drop does not pass, negative where it passes more; empty where it is
   /// not measured.
   static Eigen::VectorXd lacking_flow(const MachineSeries& log, int at,
-                                      std::span<const double> shape) {
+                                      std::span<const double> shape,
+                                      const Eigen::VectorXd& lost = {}) {
     const double setting = shape[0];
     const double most = shape[1] < 0.5 ? std::numeric_limits<double>::infinity() : 1.0;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
@@ -112,7 +114,8 @@ class ValvePressureDrop final : public Effect {
       return {};
     Eigen::VectorXd lacking = Eigen::VectorXd::Zero(log.samples());
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
-      const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+      const double drop = supply[k] - (command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]) -
+                          (lost.size() > 0 ? lost[k] : 0.0);
       if (command[k] != 0.0) lacking[k] = 1.0 - std::sqrt(std::clamp(drop / setting, 0.0, most));
     }
     return lacking;

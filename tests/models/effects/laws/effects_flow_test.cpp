@@ -154,7 +154,7 @@ TEST_F(FlowEffects, FlowRisesBeyondTheSettingOfACompensatorThatHasFailed) {
   const Effect& effect = effect_named("valve_pressure_drop");
   EXPECT_TRUE(effect.needs_reference(std::vector{setting, 0.0}));
   EXPECT_FALSE(effect.needs_reference(std::vector{setting, 1.0}));
-  const VectorXd passed = effect.passed_flow(log, 0, 0, std::vector{1.0, setting, 0.0});
+  const VectorXd passed = effect.passed_flow(log, 0, 0, std::vector{1.0, setting, 0.0}, {});
   const CylinderSeries& c = log.cylinders[0];
   Index more = 0;
   for (Index k = 0; k < log.samples(); ++k) {
@@ -179,8 +179,8 @@ TEST_F(FlowEffects, SaturationActsInThePumpAloneWhereFlowsFollowThePressureDrop)
     const int at = static_cast<int>(i);
     ASSERT_TRUE(effect_named("flow_saturation")
                     .columns(log, {EvidenceKind::kFlow, at}, 0, std::vector{limit}, c));
-    log.cylinders[i].passed = effect_named("valve_pressure_drop").passed_flow(log, at, at, law);
-    EXPECT_EQ(effect_named("valve_pressure_drop").passed_flow(log, 1 - at, at, law).size(), 0);
+    log.cylinders[i].passed = effect_named("valve_pressure_drop").passed_flow(log, at, at, law, {});
+    EXPECT_EQ(effect_named("valve_pressure_drop").passed_flow(log, 1 - at, at, law, {}).size(), 0);
     EXPECT_FALSE(effect_named("flow_saturation")
                      .columns(log, {EvidenceKind::kFlow, at}, 0, std::vector{limit}, c));
   }
