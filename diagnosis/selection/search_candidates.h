@@ -29,6 +29,14 @@ inline constexpr double kShapeWidth = 2e-3;
 /// @threshold [sections] 5..50; numerical: a thousandth of the bracket is left, which ends the search of a value near zero
 inline constexpr int kMostShapeSections = 14;
 
+/// Factor up to which a nonlinear parameter is searched beyond the only value of its grid.
+/// @threshold [1] 2..100; chosen: a damping ratio between a hundredth and a half
+inline constexpr double kShapeReach = 8.0;
+/// Largest number of searches along every nonlinear parameter in turn, where an effect has two or more: the best value of one
+/// depends on the others.
+/// @threshold [1] 2..10; chosen: the third changes a rope's length by less than its interval
+inline constexpr int kShapeSweeps = 3;
+
 /// The log on which the grids of nonlinear parameters are made: the longest suspect log, because grids of limits (a
 /// cushion's length, a pump's flow) depend on the range that a log covers.
 const MachineSeries& grid_log(const Evidence& evidence);

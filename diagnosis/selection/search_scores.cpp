@@ -13,6 +13,14 @@ namespace {
 constexpr int kPasses = 2;
 constexpr double kGolden = 0.381966;  // share of the golden section
 
+/// Description of nonlinear parameter `k`, counted among the nonlinear ones.
+const EffectParameter& shape_parameter(const Effect& effect, std::size_t k) {
+  const std::vector<EffectParameter>& all = effect.info().parameters;
+  const auto linear = static_cast<std::size_t>(
+      std::count_if(all.begin(), all.end(), [](const EffectParameter& p) { return p.linear; }));
+  return all[linear + k];
+}
+
 std::vector<CandidateScore> sorted(std::vector<CandidateScore> scores) {
   std::erase_if(scores, [](const CandidateScore& s) { return s.gain <= -1e299; });
   std::sort(scores.begin(), scores.end(),
@@ -206,6 +214,47 @@ LeastSquaresResidual SearchScores::least_squares(const std::vector<const EffectD
   return least_squares_residual(evidence_, base, design, connected(base, design));
 }
 
+/// Golden sections along one nonlinear parameter, between its neighbours on the grid, or between a share and a multiple of the grid's
+/// only value.
+void SearchScores::refine_along(const Beside& beside, const SearchCandidate& candidate,
+                                std::size_t k, EffectDesign& d, double& at_best) const {
+  std::vector<double> values;
+  for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
+  std::sort(values.begin(), values.end());
+  values.erase(std::unique(values.begin(), values.end()), values.end());
+  double lo = d.shape[k], hi = d.shape[k];
+  if (values.size() == 1) {
+    const EffectParameter& parameter = shape_parameter(*d.effect.effect, k);
+    lo = std::max(parameter.lower, values.front() / kShapeReach);
+    hi = std::min(parameter.upper, values.front() * kShapeReach);
+  } else {
+    for (const double v : values) {
+      if (v < d.shape[k] - 1e-12) lo = v;
+      if (v > d.shape[k] + 1e-12) {
+        hi = v;
+        break;
+      }
+    }
+  }
+  for (int i = 0; i < kMostShapeSections && hi - lo > kShapeWidth * std::max(std::abs(hi), 1e-12);
+       ++i) {
+    const bool right = hi - d.shape[k] > d.shape[k] - lo;
+    const double x =
+        right ? d.shape[k] + kGolden * (hi - d.shape[k]) : d.shape[k] - kGolden * (d.shape[k] - lo);
+    std::vector<double> shape = d.shape;
+    shape[k] = x;
+    EffectDesign trial = make_design(evidence_, d.effect, shape, {}, d.optional);
+    const double g = trial.acts() ? gain_beside(beside, trial) : -1e300;
+    if (g > at_best) {
+      (right ? lo : hi) = d.shape[k];
+      d = std::move(trial);
+      at_best = g;
+    } else {
+      (right ? hi : lo) = x;
+    }
+  }
+}
+
 EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
                                    const CandidateScore& score, const EffectFit& current) const {
   const SearchCandidate& candidate = candidates_[score.candidate];
@@ -215,34 +264,12 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
   const Beside beside{base, current, &first};
   double at_best = gain_beside(beside, d);
   const std::vector<bool> choices = shape_choices(*d.effect.effect);
-  for (std::size_t k = 0; k < d.shape.size(); ++k) {
-    if (choices[k]) continue;
-    std::vector<double> values;
-    for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
-    std::sort(values.begin(), values.end());
-    values.erase(std::unique(values.begin(), values.end()), values.end());
-    const auto here = std::lower_bound(values.begin(), values.end(), d.shape[k] - 1e-12);
-    if (here == values.end()) continue;
-    double lo = here == values.begin() ? *here : *(here - 1);
-    double hi = here + 1 == values.end() ? *here : *(here + 1);
-    for (int i = 0; i < kMostShapeSections && hi - lo > kShapeWidth * std::max(std::abs(hi), 1e-12);
-         ++i) {
-      const bool right = hi - d.shape[k] > d.shape[k] - lo;
-      EffectDesign trial = d;
-      const double x = right ? d.shape[k] + kGolden * (hi - d.shape[k])
-                             : d.shape[k] - kGolden * (d.shape[k] - lo);
-      std::vector<double> shape = d.shape;
-      shape[k] = x;
-      trial = make_design(evidence_, d.effect, shape, {}, d.optional);
-      const double g = trial.acts() ? gain_beside(beside, trial) : -1e300;
-      if (g > at_best) {
-        (right ? lo : hi) = d.shape[k];
-        d = std::move(trial);
-        at_best = g;
-      } else {
-        (right ? hi : lo) = x;
-      }
-    }
+  const auto free = std::count(choices.begin(), choices.end(), false);
+  for (int sweep = 0; sweep < (free > 1 ? kShapeSweeps : 1); ++sweep) {
+    const double before = at_best;
+    for (std::size_t k = 0; k < d.shape.size(); ++k)
+      if (!choices[k]) refine_along(beside, candidate, k, d, at_best);
+    if (at_best < before + options_.least_reshape_gain) break;
   }
   return d;
 }

@@ -78,6 +78,8 @@ class SearchScores {
     const EffectFit& current;
     const WhitenedChannels* first = nullptr;
   };
+  void refine_along(const Beside& beside, const SearchCandidate& candidate, std::size_t k,
+                    EffectDesign& d, double& at_best) const;
   double gain_beside(const Beside& beside, const EffectDesign& d,
                      const std::vector<bool>& also = {}, bool only_there = false) const;
   std::vector<bool> connected(const std::vector<const EffectDesign*>& designs,

@@ -6,6 +6,7 @@
 
 #include "identification/signals/load_sensing_leader.h"
 #include "models/effects/memory.h"
+#include "models/effects/tip_motion.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
 
@@ -136,6 +137,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     }
   }
   set_static_slopes(machine, out);
+  if (machine.tip.joint >= 0) out.tip = tip_motion(out);
   out = with_openings(model.effects, std::move(out));
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {
     PumpSeries pump;

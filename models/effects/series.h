@@ -64,6 +64,12 @@ struct PumpSeries {
   Eigen::MatrixXd asked;
 };
 
+/// Motion of the machine's tip (models/effects/tip_motion.h), in the base frame.
+struct TipMotion {
+  Eigen::MatrixX3d acceleration;  ///< [samples x 3, m/s^2]; no rows: not computed
+  Eigen::MatrixXd jacobian;  ///< [samples x 3 joints]: d tip / d q, three columns for each joint
+};
+
 struct MachineSeries {
   /// Shared with whatever keeps the series, a diagnosis for example, which may outlive the model it was made with.
   std::shared_ptr<const Machine> machine;
@@ -74,6 +80,7 @@ struct MachineSeries {
   Eigen::VectorXd payload;                                  ///< [kg]
   Eigen::VectorXd oil;                                      ///< [degC]
   Eigen::VectorXd return_pressure;  ///< [Pa] of the common return line; empty: not measured
+  TipMotion tip;
   std::vector<CylinderSeries> cylinders;
   std::vector<PumpSeries> pumps;
 

@@ -172,7 +172,7 @@ class LineLoss final : public Effect {
     return 0.5 * (lo + hi);
   }
   /// The valve's gains and the share depend on each other; the second turn changes a share of a half by some per mille.
-  static constexpr int kTurns = 2;
+  static constexpr int kTurns = 5;
   /// The last of them changes a share by a millionth.
   static constexpr int kHalvings = 20;
 };

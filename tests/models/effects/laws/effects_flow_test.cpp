@@ -170,6 +170,51 @@ TEST_F(FlowEffects, FlowRisesBeyondTheSettingOfACompensatorThatHasFailed) {
   EXPECT_LT(residual(right, log.cylinders[0].speed), 1e-9);
 }
 
+/// A loss between valve and cylinder takes its part of the drop that is measured over both: with a quadratic loss and an edge below its
+/// setting, Q = Q_valve (drop / (setting + k Q_valve^2))^0.5 in closed form.
+TEST_F(FlowEffects, LossBehindTheValveLowersTheFlowWhereItFollowsThePressureDrop) {
+  const double setting = 40e5;  // above all pressure drops, so that the edge is never compensated
+  const std::vector<double> law{1.0, setting, 0.0};
+  const Effect& loss = effect_named("line_loss");
+  MatrixXd c;
+  const std::vector<double> at_cylinder{0.0}, at_valve{1.0};
+  EXPECT_FALSE(loss.columns(log, {EvidenceKind::kFlow, 0}, 0, at_cylinder, c));
+  CylinderSeries& s = log.cylinders[0];
+  s.passing = {&effect_named("valve_pressure_drop"), 0, law};
+  EXPECT_FALSE(loss.columns(log, {EvidenceKind::kFlow, 1}, 0, at_cylinder, c));
+  EXPECT_FALSE(loss.columns(log, {EvidenceKind::kFlow, 0}, 0, at_valve, c));
+
+  const Cylinder& cylinder = log.machine->cylinders[0];
+  const double k = 3e12;  // [Pa s^2/m^6]
+  const VectorXd without = s.passing.effect->passed_flow(log, 0, 0, law, {});
+  VectorXd with(log.samples());
+  const double gain[2] = {0.11, 0.17};  // [m/s] extending, retracting
+  const auto speed_at = [&](Index i) { return gain[s.command[i] > 0.0 ? 0 : 1] * s.command[i]; };
+  for (Index i = 0; i < log.samples(); ++i) {
+    const double q = std::abs(speed_at(i)) * supply_area(cylinder, s.command[i] > 0.0 ? 1 : -1);
+    with[i] = without[i] / std::sqrt(1.0 + k * q * q / setting);
+    s.speed[i] = speed_at(i) * with[i];
+  }
+  const std::vector<double> about{k, 0.0};
+  ASSERT_TRUE(loss.columns(log, {EvidenceKind::kFlow, 0, about}, 0, at_cylinder, c));
+  ASSERT_EQ(c.cols(), 2);
+  double largest = 0.0;
+  for (Index i = 0; i < log.samples(); ++i)
+    largest = std::max(largest, std::abs(speed_at(i) * (with[i] - without[i])));
+  ASSERT_GT(largest, 1e-3);
+  for (Index i = 0; i < log.samples(); ++i)
+    ASSERT_NEAR(k * c(i, 0), speed_at(i) * (with[i] - without[i]), 0.02 * largest) << i;
+  // the same loss as a part of the model
+  const VectorXd lost = loss.lost_behind_valve(log, 0, 0, std::vector{k, 0.0, 0.0});
+  const VectorXd passed = s.passing.effect->passed_flow(log, 0, 0, law, lost);
+  for (Index i = 0; i < log.samples(); ++i) {
+    if (s.command[i] == 0.0) continue;
+    ASSERT_NEAR(passed[i], with[i], 0.01) << i;
+  }
+  EXPECT_EQ(loss.lost_behind_valve(log, 1, 0, std::vector{k, 0.0, 0.0}).size(), 0);
+  EXPECT_EQ(loss.lost_behind_valve(log, 0, 0, std::vector{k, 0.0, 1.0}).size(), 0);
+}
+
 // Where the model computes the flow from the measured pump pressure, a pump at its limit lowers that pressure, and beside it no flow.
 TEST_F(FlowEffects, SaturationActsInThePumpAloneWhereFlowsFollowThePressureDrop) {
   const double limit = 1.3e-3;
