@@ -64,6 +64,23 @@ int independent_columns(const std::vector<EffectDesign>& designs) {
   return static_cast<int>(linear);
 }
 
+/// Penalty of the nonlinear parameters: `each` for one that has a scale, the logarithm of their number for variants of a law, among
+/// which nothing is estimated.
+double shape_penalty(const SearchCandidate& c, double each) {
+  double sum = 0.0;
+  std::size_t k = 0;
+  for (const EffectParameter& p : c.effect.effect->info().parameters) {
+    if (p.linear) continue;
+    std::vector<double> values;
+    for (const EffectDesign& d : c.designs) values.push_back(d.shape[k]);
+    std::sort(values.begin(), values.end());
+    values.erase(std::unique(values.begin(), values.end()), values.end());
+    sum += p.choice ? std::log(static_cast<double>(values.size())) : each;
+    ++k;
+  }
+  return sum;
+}
+
 }  // namespace
 
 const MachineSeries& grid_log(const Evidence& evidence) {
@@ -102,7 +119,7 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
       std::move(c.designs.begin(), c.designs.end(), std::back_inserter(all_designs));
       c.designs = std::move(all_designs);
     }
-    c.penalty = each * (c.linear + static_cast<double>(c.designs.front().shape.size()));
+    c.penalty = each * c.linear + shape_penalty(c, each);
   }
   return all;
 }

@@ -42,7 +42,8 @@ inline constexpr int kShapeSweeps = 3;
 const MachineSeries& grid_log(const Evidence& evidence);
 
 /// The candidates that act on some channel of the evidence, in the order given.
-/// Penalty: Schwarz (1978), half the logarithm of the number of rows for each parameter with an independent column.
+/// Penalty: Schwarz (1978), half the logarithm of the number of rows for each parameter with an independent column and for each
+/// nonlinear one that has a scale; the logarithm of their number for variants of a law.
 std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
                                                const std::vector<EffectAt>& effects);
 

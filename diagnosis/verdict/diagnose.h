@@ -144,6 +144,10 @@ struct VerdictOptions {
   /// Searches in which an effect that the references share joins what acts in all logs.
   /// @threshold [1] 1..; chosen: each removes what the last one named in both; plants of the simulator need up to six
   int shared_turns = 10;
+  /// Largest number of effects that references may show the model to lack, for each cylinder of the machine.
+  /// @threshold [effects] 1..20; chosen: friction, the valve's lag and pressure drop, and compressibility of each cylinder. With eight
+  /// for a machine of four cylinders the noise of a jib's force was 1.8 kN in place of 0.3 kN, its Coulomb friction being left out
+  int effects_lacking_by_cylinder = 4;
   /// Factor by which an effect must reduce a channel's error for that to be stated as evidence.
   /// @threshold [1] 1..; chosen: two percent; a smaller change is no evidence to a reader.
   double least_reduction = 1.02;

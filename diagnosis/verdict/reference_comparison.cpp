@@ -447,7 +447,12 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
   };
   DiagnoseOptions now = options;
   now.evidence.settles = true;
-  const Diagnosis before = diagnose_sound(model, {signals.references}, now, part(0.0, 0.4));
+  // What a model lacks is more than what changes. Physics left out here would be noise beside every difference.
+  DiagnoseOptions alone = now;
+  alone.search.max_effects =
+      std::max(now.search.max_effects,
+               now.verdict.effects_lacking_by_cylinder * model.machine.cylinder_count());
+  const Diagnosis before = diagnose_sound(model, {signals.references}, alone, part(0.0, 0.4));
   CraneModel with = model;
   now.evidence.shared = effects_in_references(model, signals.references);
   const auto add = [&](const AppliedEffect& e) {

@@ -161,12 +161,16 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
     const Hidden hidden = drawn_change(machine, a, random);
     PlantParameters changed = as_built;
     double told = 1.0;
+    std::string values = "payload as told, times 0.8";
     if (*hidden.change->key == '\0') {
       told = 0.8;
     } else {
       const plant::ParameterRow& row = *plant::find_parameter(hidden.change->key);
       double& value = row.value(changed, hidden.place);
+      const double before = value;
       value = hidden.change->factor * value + hidden.change->plus * row.scale;
+      values = fmt::format("{} {:.4g} -> {:.4g} {}", row.key, before / row.scale, value / row.scale,
+                           row.unit);
     }
     const auto log = [&](const PlantParameters& p, std::uint64_t work, double factor) {
       const std::string text = plant_log(machine, p, 100 * seed + work, a.seconds, factor);
@@ -193,6 +197,7 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
       judge(d, clean ? Hidden{} : hidden, c);
       c.seconds = d.seconds;
+      if (a.verbose && !clean) c.answer += "(" + values + ")";
       if (a.verbose) c.answer += "\n" + d.table();
       cases.push_back(std::move(c));
     }

@@ -55,7 +55,7 @@ class PayloadSway final : public Effect {
         .citation =
             "Abdel-Rahman, Nayfeh, Masoud (2003), Dynamics and control of cranes: a review, "
             "J. Vib. Control 9, sec. 2",
-        .form_error = 0.1,
+        .form_error = 0.02,
         .in_motion =
             "nothing: motions are planned for a payload that follows the tip; over a motion "
             "from rest to rest the sway takes up no work but its damping"};
