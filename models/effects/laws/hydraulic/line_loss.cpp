@@ -171,9 +171,11 @@ class LineLoss final : public Effect {
     }
     return 0.5 * (lo + hi);
   }
-  /// The valve's gains and the share depend on each other; the second turn changes a share of a half by some per mille.
+  /// Turns in which the valve's gains and the share are computed, which depend on each other.
+  /// @threshold [1] 2..20; numerical: an edge that passes a half everywhere has a share within 2 % then
   static constexpr int kTurns = 5;
-  /// The last of them changes a share by a millionth.
+  /// Halvings of the interval in which the share lies.
+  /// @threshold [1] 8..40; numerical: the last of them changes a share by a millionth
   static constexpr int kHalvings = 20;
 };
 
