@@ -170,6 +170,34 @@ TEST_F(FlowEffects, FlowRisesBeyondTheSettingOfACompensatorThatHasFailed) {
   EXPECT_LT(residual(right, log.cylinders[0].speed), 1e-9);
 }
 
+/// With compensators behind the edges every section has the drop between the pump and the highest load that is commanded.
+TEST_F(FlowEffects, SectionsShareTheFlowWhereTheirCompensatorsKnowTheHighestLoad) {
+  const double setting = 12e5;
+  const Effect& effect = effect_named("valve_pressure_drop");
+  Index other = 0, own = 0, alone = 0;
+  for (const int at : {0, 1}) {
+    const VectorXd passed = effect.passed_flow(log, at, at, std::vector{1.0, setting, 2.0}, {});
+    for (Index k = 0; k < log.samples(); ++k) {
+      const CylinderSeries &c = log.cylinders[static_cast<std::size_t>(at)],
+                           &d = log.cylinders[static_cast<std::size_t>(1 - at)];
+      if (c.command[k] == 0.0) continue;
+      const double here = c.command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k];
+      const double there = d.command[k] > 0.0   ? d.pressure_a[k]
+                           : d.command[k] < 0.0 ? d.pressure_b[k]
+                                                : 0.0;
+      const double drop = log.pumps[0].pressure[k] - std::max(here, there);
+      ASSERT_NEAR(passed[k], std::sqrt(std::clamp(drop / setting, 0.0, 1.0)), 1e-12) << k;
+      (d.command[k] == 0.0 ? alone : here < there ? other : own) += 1;
+    }
+  }
+  EXPECT_GT(std::min({other, own, alone}), 10);
+  // the only section of a pump shares with none, so that the variant would be the plain law again
+  Machine one = machine;
+  one.pumps[0].feeds = {0};
+  log.machine = std::make_shared<const Machine>(one);
+  EXPECT_EQ(effect.passed_flow(log, 0, 0, std::vector{1.0, setting, 2.0}, {}).size(), 0);
+}
+
 /// A loss between valve and cylinder takes its part of the drop that is measured over both: with a quadratic loss and an edge below its
 /// setting, Q = Q_valve (drop / (setting + k Q_valve^2))^0.5 in closed form.
 TEST_F(FlowEffects, LossBehindTheValveLowersTheFlowWhereItFollowsThePressureDrop) {
