@@ -145,7 +145,7 @@ class Effect {
                              Eigen::VectorXd& /*opening*/) const {}
 
   /// Share of a valve's flow [samples, -] that the measured pressure drop over its edge passes; empty: no such law.
-  /// @param lost [samples, Pa] pressure lost between valve and cylinder, which is no drop over the edge; empty: nothing
+  /// The last argument is the pressure lost between valve and cylinder [samples, Pa], which is no drop over the edge; empty: nothing.
   virtual Eigen::VectorXd passed_flow(const MachineSeries& /*log*/, int /*cylinder*/, int /*at*/,
                                       std::span<const double> /*p*/,
                                       const Eigen::VectorXd& /*lost*/) const {
