@@ -172,9 +172,9 @@ TEST_F(FlowEffects, FlowRisesBeyondTheSettingOfACompensatorThatHasFailed) {
 
 /// With compensators behind the edges every section has the drop between the pump and the highest load that is commanded.
 TEST_F(FlowEffects, SectionsShareTheFlowWhereTheirCompensatorsKnowTheHighestLoad) {
-  const double setting = 12e5;
+  const double setting = 40e5;  // above most pressure drops
   const Effect& effect = effect_named("valve_pressure_drop");
-  Index other = 0, own = 0, alone = 0;
+  Index other = 0, own = 0, alone = 0, differs = 0;
   for (const int at : {0, 1}) {
     const VectorXd passed = effect.passed_flow(log, at, at, std::vector{1.0, setting, 2.0}, {});
     for (Index k = 0; k < log.samples(); ++k) {
@@ -186,11 +186,15 @@ TEST_F(FlowEffects, SectionsShareTheFlowWhereTheirCompensatorsKnowTheHighestLoad
                            : d.command[k] < 0.0 ? d.pressure_b[k]
                                                 : 0.0;
       const double drop = log.pumps[0].pressure[k] - std::max(here, there);
+      differs += passed[k] < 0.99 * std::sqrt(std::clamp(
+                                        (log.pumps[0].pressure[k] - here) / setting, 0.0, 1.0))
+                     ? 1
+                     : 0;
       ASSERT_NEAR(passed[k], std::sqrt(std::clamp(drop / setting, 0.0, 1.0)), 1e-12) << k;
       (d.command[k] == 0.0 ? alone : here < there ? other : own) += 1;
     }
   }
-  EXPECT_GT(std::min({other, own, alone}), 10);
+  EXPECT_GT(std::min({other, own, alone, differs}), 10);
   // the only section of a pump shares with none, so that the variant would be the plain law again
   Machine one = machine;
   one.pumps[0].feeds = {0};
