@@ -1,6 +1,9 @@
 #include "models/effects/tip_motion.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "models/machine/kinematics.h"
 

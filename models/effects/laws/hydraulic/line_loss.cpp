@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "models/effects/builtin.h"
 #include "models/effects/hydraulics.h"
