@@ -46,7 +46,8 @@ class PayloadSway final : public Effect {
               {0.06}}},
         .equation =
             "F = F_static + J^T share payload (g - a_tip - T n), n'' = G - n (n G + |n'|^2) - "
-            "2 damping n' (g/rope)^0.5, G = (g - a_tip) / rope, T = rope (n G + |n'|^2)",
+            "2 damping n' (g/rope)^0.5, G = (g - a_tip) / rope, T = rope (n G + |n'|^2); n = unit "
+            "vector from tip to payload, T = rope's force per mass",
         .signals = {"cylinder force or both chamber pressures", "position", "payload"},
         .confused_with = {"inertia", "structural_flex"},
         .separated_by =
