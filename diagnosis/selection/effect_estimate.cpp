@@ -147,6 +147,18 @@ class Estimator {
     return evidence;
   }
 
+  /// Adds what a search has found between the grid's values.
+  void add_start(std::vector<EffectDesign>& grid, const std::vector<double>& shape) const {
+    if (shape.size() != grid.front().shape.size() ||
+        std::any_of(grid.begin(), grid.end(),
+                    [&](const EffectDesign& d) { return d.shape == shape; }))
+      return;
+    const bool optional =
+        std::any_of(grid.begin(), grid.end(), [](const EffectDesign& d) { return d.optional; });
+    EffectDesign start = make_design(evidence_, grid.front().effect, shape, {}, optional);
+    if (start.acts()) grid.push_back(std::move(start));
+  }
+
   void add_design(const CraneModel& model, const EffectAt& e) {
     const auto known =
         std::find_if(model.effects.begin(), model.effects.end(),
@@ -157,6 +169,8 @@ class Estimator {
       if (!acting.back().acts()) acting.clear();
     } else {
       for (SearchCandidate& c : search_candidates(evidence_, {e})) acting = std::move(c.designs);
+      if (!acting.empty() && designs_.size() < options_.starts.size())
+        add_start(acting, options_.starts[designs_.size()]);
     }
     if (acting.empty()) {
       throw InputError(

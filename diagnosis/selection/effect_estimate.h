@@ -23,6 +23,8 @@ struct EstimateOptions {
   /// Factor by which a nonlinear parameter may leave its value on the grid, up or down.
   /// @threshold [1] 1..; chosen: limits it beyond the ends of the grid, where no neighbour does
   double largest_step = 2.0;
+  /// Nonlinear parameters at which a search has found each effect of `wanted` [SI]; they are tried beside the grid. Empty: none.
+  std::vector<std::vector<double>> starts = {};
 };
 
 /// The logs that effects are estimated from.

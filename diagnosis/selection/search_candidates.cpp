@@ -81,6 +81,13 @@ double shape_penalty(const SearchCandidate& c, double each) {
   return sum;
 }
 
+int values_from_measurement(const Evidence& evidence, const SearchCandidate& candidate) {
+  int sum = 0;
+  for (std::size_t log = 0; log < evidence.suspects; ++log)
+    sum += candidate.effect.effect->values_from_measurement(evidence.series[log]);
+  return sum;
+}
+
 }  // namespace
 
 const MachineSeries& grid_log(const Evidence& evidence) {
@@ -119,7 +126,8 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
       std::move(c.designs.begin(), c.designs.end(), std::back_inserter(all_designs));
       c.designs = std::move(all_designs);
     }
-    c.penalty = each * c.linear + shape_penalty(c, each);
+    c.penalty =
+        each * c.linear + shape_penalty(c, each) + each * values_from_measurement(evidence, c);
   }
   return all;
 }

@@ -132,7 +132,11 @@ void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signal
   while (!found.empty()) {
     std::vector<EffectAt> wanted;
     wanted.reserve(found.size());
-    for (const FoundEffect& f : found) wanted.push_back(f.design.effect);
+    options.starts.clear();
+    for (const FoundEffect& f : found) {
+      wanted.push_back(f.design.effect);
+      options.starts.push_back(f.design.shape);
+    }
     all = estimate_effects(model, wanted,
                            {signals.suspects,
                             signals.references,

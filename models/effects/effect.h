@@ -183,6 +183,9 @@ class Effect {
   virtual std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const;
   /// Whether columns() depend on the linear parameters (MeasuredQuantity::about): a secant, computed anew at the values found.
   virtual bool depends_on_size() const { return false; }
+  /// Number of values that columns() take from the measured quantity itself, beside the parameters (states at the beginning of
+  /// stretches of motion). A search counts each as a parameter.
+  virtual int values_from_measurement(const MachineSeries& /*log*/) const { return 0; }
   /// Whether columns() are computed from filtered derivatives alone (inertia) and must not be filtered again.
   virtual bool columns_filtered() const { return false; }
   /// Whether columns() contain unfiltered measurements with their noise; they are comparable to filtered signals only

@@ -1,6 +1,9 @@
 #pragma once
 /// Motion of the point from which a payload hangs, computed from a log's joint positions and their derivatives.
+#include <span>
+
 #include "models/effects/series.h"
+#include "models/effects/swing_state.h"
 
 namespace sparflow {
 
@@ -17,6 +20,6 @@ TipMotion tip_motion(const MachineSeries& log);
 /// @param rope [m] > 0  @param damping ratio of the free sway [-] >= 0
 Eigen::MatrixX3d pull_of_hanging_weight(const MachineSeries& log,
                                         const Eigen::MatrixX3d& acceleration, double rope,
-                                        double damping);
+                                        double damping, std::span<const LoadPart> parts = {});
 
 }  // namespace sparflow

@@ -68,6 +68,10 @@ class PayloadSway final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool columns_filtered() const override { return true; }
+  /// The state of the load where the log begins and after each change of payload.
+  int values_from_measurement(const MachineSeries& log) const override {
+    return 4 * swinging_part_count(log);
+  }
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
@@ -78,7 +82,9 @@ class PayloadSway final : public Effect {
     if (joint > machine.tip.joint) return false;
     const TipMotion computed = log.tip.acceleration.rows() > 0 ? TipMotion() : tip_motion(log);
     const TipMotion& tip = log.tip.acceleration.rows() > 0 ? log.tip : computed;
-    const Eigen::MatrixX3d pull = pull_of_hanging_weight(log, tip.acceleration, shape[0], shape[1]);
+    const std::vector<LoadPart> parts = swinging_parts(log, tip, shape[0], shape[1]);
+    const Eigen::MatrixX3d pull =
+        pull_of_hanging_weight(log, tip.acceleration, shape[0], shape[1], parts);
     columns =
         tip.jacobian.middleCols<3>(Eigen::Index{3} * joint).cwiseProduct(pull).rowwise().sum();
     columns.col(0).array() *=

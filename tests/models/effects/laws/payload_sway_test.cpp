@@ -45,8 +45,13 @@ Vector3d tip_acceleration(const Machine& machine, double t) {
 
 /// A weight on a stiff spring of natural length `rope` in place of the rope, in Cartesian coordinates: another formulation of the
 /// pendulum, integrated by the explicit midpoint rule with small steps. Damping acts across the spring.
+/// @param start deflection across the rope [-] and velocity [m/s] at the first sample, from a weight that hangs along g - a
 /// @return acceleration with which the spring pulls the weight, less gravity, at each sample
-std::vector<Vector3d> rope_pull(const Machine& machine, const VectorXd& time, double rope) {
+struct Start {
+  Vector3d deflection = Vector3d::Zero(), velocity = Vector3d::Zero();
+};
+std::vector<Vector3d> rope_pull(const Machine& machine, const VectorXd& time, double rope,
+                                const Start& start = {}) {
   const double omega = std::sqrt(machine.gravity.norm() / rope);
   constexpr double kStiff = 300.0;  // [rad/s] of the spring, a hundred times the pendulum's
   const auto spring = [&](const Vector3d& e, const Vector3d& v) {
@@ -59,8 +64,12 @@ std::vector<Vector3d> rope_pull(const Machine& machine, const VectorXd& time, do
   const auto slope = [&](double t, const Vector3d& e, const Vector3d& v) {
     return (machine.gravity - tip_acceleration(machine, t) + spring(e, v)).eval();
   };
-  const Vector3d hangs = machine.gravity - tip_acceleration(machine, 0.0);
-  Vector3d e = hangs.normalized() * (rope + hangs.norm() / (kStiff * kStiff)), v = Vector3d::Zero();
+  const Vector3d hangs = machine.gravity - tip_acceleration(machine, time[0]);
+  const Vector3d along_rope = (hangs.normalized() + start.deflection).normalized();
+  Vector3d v = start.velocity - along_rope * along_rope.dot(start.velocity);
+  // the spring's length at which it carries the weight and turns it
+  const double carried = hangs.dot(along_rope) + v.squaredNorm() / rope;
+  Vector3d e = along_rope * (rope + carried / (kStiff * kStiff));
   std::vector<Vector3d> out = {spring(e, v) + machine.gravity};
   constexpr int kSteps = 8;
   for (Index k = 1; k < time.size(); ++k) {
@@ -78,12 +87,18 @@ std::vector<Vector3d> rope_pull(const Machine& machine, const VectorXd& time, do
   return out;
 }
 
+/// Without measured forces a load swings from rest.
+MachineSeries without_forces(MachineSeries log) {
+  for (CylinderSeries& s : log.cylinders) s.force.resize(0);
+  return log;
+}
+
 class PayloadSway : public testing::TestWithParam<double> {
  protected:
   const Effect& sway = *find_effect("payload_sway");
   const Machine machine = test_support::swing_crane();
-  const MachineSeries log = test_support::log_of(
-      machine, [&](double t) { return swing(machine, t); }, 12.0, 0.002, kPayload);
+  const MachineSeries log = without_forces(test_support::log_of(
+      machine, [&](double t) { return swing(machine, t); }, 12.0, 0.002, kPayload));
 
   VectorXd column(int cylinder, double rope) const {
     Eigen::MatrixXd c;
@@ -147,6 +162,48 @@ TEST_F(PayloadSway, SwingsSlowlyAtLargeDeflections) {
 TEST_F(PayloadSway, PullsNothingAtRest) {
   const Eigen::MatrixX3d rest = Eigen::MatrixX3d::Zero(log.samples(), 3);
   EXPECT_LT(pull_of_hanging_weight(log, rest, 1.5, 0.02).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+/// A load that is taken by a hook in full swing: how it swings then is in the measured forces alone, beside an offset, friction and
+/// inertia.
+TEST_F(PayloadSway, SwingsOnAsTheForcesTell) {
+  constexpr double kRope = 1.5;
+  const Index taken = 2000;  // 4 s
+  MachineSeries told = log;
+  told.payload.head(taken).setConstant(0.0);
+  const std::vector<Vector3d> pull = rope_pull(machine, log.time.tail(log.samples() - taken), kRope,
+                                               {Vector3d(0.4, -0.3, 0.0), Vector3d(0.5, 0.8, 0.0)});
+  Eigen::MatrixXd truth = Eigen::MatrixXd::Zero(log.samples(), machine.cylinder_count());
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    CylinderSeries& s = told.cylinders[static_cast<std::size_t>(i)];
+    const int joint = machine.cylinders[static_cast<std::size_t>(i)].joint;
+    for (Index k = taken; k < log.samples(); ++k) {
+      const Eigen::Matrix3Xd jacobian = point_jacobian_matrix(machine, VectorXd(log.q.row(k)),
+                                                              machine.tip.joint, machine.tip.xyz);
+      const Vector3d beyond =
+          pull[static_cast<std::size_t>(k - taken)] - tip_acceleration(machine, log.time[k]);
+      truth(k, i) =
+          machine.tip.payload_scale * kPayload * jacobian.col(joint).dot(beyond) / s.rate[k];
+    }
+    s.force = s.static_force + truth.col(i);
+    const double scale = truth.col(i).cwiseAbs().maxCoeff();
+    s.acceleration = log.qdd.col(joint);
+    s.direction = s.speed.unaryExpr([](double v) { return v > 0.0 ? 1 : -1; });
+    s.force.array() +=
+        scale * (0.3 + 0.2 * s.direction.cast<double>().array() +
+                 0.5 * s.acceleration.array() / s.acceleration.cwiseAbs().maxCoeff());
+  }
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    Eigen::MatrixXd by_forces, at_rest;
+    const std::vector<double> shape = {kRope, kDamping};
+    ASSERT_TRUE(sway.columns(told, {EvidenceKind::kForce, i}, -1, shape, by_forces));
+    ASSERT_TRUE(sway.columns(without_forces(told), {EvidenceKind::kForce, i}, -1, shape, at_rest));
+    const double all = truth.col(i).norm();
+    // The forces are compared at every quarter of a radian of the swing.
+    EXPECT_LT((by_forces.col(0) - truth.col(i)).norm(), 0.02 * all) << i;
+    EXPECT_GT((at_rest.col(0) - truth.col(i)).norm(), 0.3 * all) << i;
+  }
+  EXPECT_EQ(sway.values_from_measurement(told), 4);
 }
 
 TEST_F(PayloadSway, VanishesWithTheRope) {

@@ -1,0 +1,29 @@
+#pragma once
+/// A weight on a rope below an accelerated point: the spherical pendulum of any deflection.
+#include <Eigen/Dense>
+
+namespace sparflow {
+
+struct Pendulum {
+  Eigen::Vector3d down, rate;  ///< unit vector from the point to the weight, its derivative [1/s]
+
+  /// Second derivative of `down`. @param pull (g - acceleration) / rope [1/s^2]  @param decay damping ratio times frequency [1/s]
+  Eigen::Vector3d slope(const Eigen::Vector3d& pull, double decay) const {
+    return pull - down * (down.dot(pull) + rate.squaredNorm()) - 2.0 * decay * rate;
+  }
+  /// Moves by dt [s] while the pull changes linearly, in steps of at most `phase` [rad] of a swing of `frequency` [rad/s].
+  void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt, double decay,
+            double frequency, double phase);
+  /// Rope's force on the point beyond that of a weight fixed to it, per mass and rope's length [1/s^2].
+  Eigen::Vector3d beyond_fixed(const Eigen::Vector3d& pull) const {
+    return pull - down * (down.dot(pull) + rate.squaredNorm());
+  }
+
+ private:
+  Pendulum moved(const Eigen::Vector3d& by_down, const Eigen::Vector3d& by_rate) const {
+    return {down + by_down, rate + by_rate};
+  }
+  void step(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt, double decay);
+};
+
+}  // namespace sparflow
