@@ -1,4 +1,5 @@
 #include "models/effects/builtin.h"
+#include "models/effects/hanging_load/swing_state.h"
 #include "models/effects/tip_motion.h"
 
 namespace sparflow {

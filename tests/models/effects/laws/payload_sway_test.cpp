@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "models/effects/effect.h"
-#include "models/effects/tip_motion.h"
+#include "models/effects/hanging_load/swing_state.h"
 #include "models/machine/kinematics.h"
 #include "tests/models/effects/effects_support.h"
 

@@ -4,6 +4,11 @@
 
 namespace sparflow {
 
+struct SwingDecay {
+  double decay;         ///< [1/s] damping ratio times frequency
+  double largest_step;  ///< [s] of integration
+};
+
 struct Pendulum {
   Eigen::Vector3d down, rate;  ///< unit vector from the point to the weight, its derivative [1/s]
 
@@ -11,9 +16,9 @@ struct Pendulum {
   Eigen::Vector3d slope(const Eigen::Vector3d& pull, double decay) const {
     return pull - down * (down.dot(pull) + rate.squaredNorm()) - 2.0 * decay * rate;
   }
-  /// Moves by dt [s] while the pull changes linearly, in steps of at most `phase` [rad] of a swing of `frequency` [rad/s].
-  void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt, double decay,
-            double frequency, double phase);
+  /// Moves by dt [s] while the pull changes linearly from one value to another.
+  void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt,
+            const SwingDecay& swing);
   /// Rope's force on the point beyond that of a weight fixed to it, per mass and rope's length [1/s^2].
   Eigen::Vector3d beyond_fixed(const Eigen::Vector3d& pull) const {
     return pull - down * (down.dot(pull) + rate.squaredNorm());

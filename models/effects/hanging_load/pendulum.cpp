@@ -1,4 +1,4 @@
-#include "models/effects/pendulum.h"
+#include "models/effects/hanging_load/pendulum.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,11 @@ namespace sparflow {
 
 using Eigen::Vector3d;
 
-void Pendulum::move(const Vector3d& from, const Vector3d& to, double dt, double decay,
-                    double frequency, double phase) {
-  const int steps = std::max(1, static_cast<int>(std::ceil(dt * frequency / phase)));
+void Pendulum::move(const Vector3d& from, const Vector3d& to, double dt, const SwingDecay& swing) {
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt / swing.largest_step)));
   for (int s = 0; s < steps; ++s) {
     const double a = static_cast<double>(s) / steps, b = static_cast<double>(s + 1) / steps;
-    step((1.0 - a) * from + a * to, (1.0 - b) * from + b * to, dt / steps, decay);
+    step((1.0 - a) * from + a * to, (1.0 - b) * from + b * to, dt / steps, swing.decay);
   }
 }
 

@@ -1,10 +1,9 @@
-#include "models/effects/swing_state.h"
+#include "models/effects/hanging_load/swing_state.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-
-#include "models/machine/kinematics.h"
+#include <limits>
+#include <utility>
 
 namespace sparflow {
 namespace {
@@ -15,6 +14,11 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::Vector4d;
 using Eigen::VectorXd;
+
+/// Phase by which the pendulum swings in a step of integration, whose error by Runge's rule of fourth order is then 1e-7 of a
+/// swing.
+/// @threshold [rad] 0.01..0.5; chosen: far below the error of the tip's acceleration
+constexpr double kStepPhase = 0.1;
 
 /// Change of the logged payload, as a share of its largest, that is another load.
 /// @threshold [-] 0.005..0.1; chosen: above the noise of a scale, below any load that is lifted
@@ -31,6 +35,7 @@ constexpr double kLeastPart = 2.0;
 /// Standard deviation of a weight's deflection about the state in which it was before, as known without forces.
 /// @threshold [rad] 0.3..1; chosen: the loads of a crane at work swing by up to 40 degrees
 constexpr double kPriorSwing = 0.5;
+constexpr double kPriorWeight = 1.0 / (kPriorSwing * kPriorSwing);  // no threshold: follows from it
 
 /// Two unit vectors across a direction.
 Eigen::Matrix<double, 3, 2> across(const Vector3d& down) {
@@ -132,9 +137,10 @@ class SwingMotion {
       : log_(log), tip_(tip), rope_(rope) {
     gravity_ = log.machine->gravity;
     frequency_ = std::sqrt(gravity_.norm() / rope);
-    decay_ = damping * frequency_;
+    swing_ = {damping * frequency_, kRowPhase / frequency_};
   }
   double frequency() const { return frequency_; }
+  const SwingDecay& swing() const { return swing_; }
   Vector3d pull_at(Index row) const {
     const Vector3d a = tip_.acceleration.row(row);
     return a.allFinite() ? Vector3d((gravity_ - a) / rope_) : Vector3d(gravity_ / rope_);
@@ -149,7 +155,7 @@ class SwingMotion {
       const Vector3d now = pull_at(i);
       if (j > 0) {
         const Index last = rows[static_cast<std::size_t>(j - 1)];
-        p.move(before, now, log_.time[i] - log_.time[last], decay_, frequency_, kRowPhase);
+        p.move(before, now, log_.time[i] - log_.time[last], swing_);
       }
       pull->row(j) = rope_ * p.beyond_fixed(now);
       before = now;
@@ -171,9 +177,16 @@ class SwingMotion {
  private:
   const MachineSeries& log_;
   const TipMotion& tip_;
-  double rope_, frequency_ = 0.0, decay_ = 0.0;
+  double rope_, frequency_ = 0.0;
+  SwingDecay swing_{};
   Vector3d gravity_;
 };
+
+constexpr double kDifference = 1e-4;  // no threshold: difference quotient [rad]
+constexpr int kMostIterations = 8;    // no threshold: two or three suffice
+constexpr int kMostAttempts = 6;      // no threshold: Levenberg's damping rises by a million
+constexpr double kConverged =
+    1e-3;  // no threshold: relative fall of the sum of squares that ends it
 
 /// Finds the state by Levenberg's iteration from the one in which the part before has ended.
 class SwingFit {
@@ -190,8 +203,6 @@ class SwingFit {
   }
 
  private:
-  static constexpr double kPriorWeight = 1.0 / (kPriorSwing * kPriorSwing);
-
   double cost(const VectorXd& left, const Vector4d& x) const {
     return left.squaredNorm() + kPriorWeight * x.squaredNorm();
   }
@@ -235,9 +246,6 @@ class SwingFit {
     }
   }
 
-  static constexpr double kDifference = 1e-4;  // [rad]
-  static constexpr int kMostIterations = 8, kMostAttempts = 6;
-  static constexpr double kConverged = 1e-3;
   const SwingMotion& motion_;
   SwingForces forces_;
   Pendulum prior_;
@@ -301,9 +309,42 @@ std::vector<LoadPart> swinging_parts(const MachineSeries& log, const TipMotion& 
     // The next part begins one row later.
     if (end < log.samples())
       state.move(motion.pull_at(end - 1), motion.pull_at(end), log.time[end] - log.time[end - 1],
-                 damping * motion.frequency(), motion.frequency(), kRowPhase);
+                 motion.swing());
   }
   return parts;
+}
+
+Eigen::MatrixX3d pull_of_hanging_weight(const MachineSeries& log,
+                                        const Eigen::MatrixX3d& acceleration, double rope,
+                                        double damping, std::span<const LoadPart> parts) {
+  const Vector3d gravity = log.machine->gravity;
+  const double frequency = std::sqrt(gravity.norm() / rope);
+  const SwingDecay swing{damping * frequency, kStepPhase / frequency};
+  Eigen::MatrixX3d out =
+      Eigen::MatrixX3d::Constant(log.samples(), 3, std::numeric_limits<double>::quiet_NaN());
+  for (const auto& [first, last] : log.runs) {
+    Vector3d pull = gravity / rope;
+    Pendulum p{pull.normalized(), Vector3d::Zero()};
+    bool begun = false;
+    for (Index i = first; i < last; ++i) {
+      const Vector3d a = acceleration.row(i);
+      const Vector3d now = a.allFinite() ? Vector3d((gravity - a) / rope) : pull;
+      while (!parts.empty() && parts.front().first < i) parts = parts.subspan(1);
+      if (!parts.empty() && parts.front().first == i) {
+        p = parts.front().start;
+        begun = true;
+      } else if (!begun) {
+        if (!a.allFinite()) continue;
+        p.down = now.normalized();
+        begun = true;
+      } else {
+        p.move(pull, now, log.time[i] - log.time[i - 1], swing);
+      }
+      pull = now;
+      if (a.allFinite()) out.row(i) = rope * p.beyond_fixed(pull);
+    }
+  }
+  return out;
 }
 
 }  // namespace sparflow
