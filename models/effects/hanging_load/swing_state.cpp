@@ -85,7 +85,9 @@ SwingForces::SwingForces(const MachineSeries& log, const TipMotion& tip, const L
     for (Index j = 0; j < n; ++j) {
       const Index i = rows_[static_cast<std::size_t>(j)];
       const double y = s.force[i] - s.static_force[i];
-      if (!std::isfinite(y) || !tip.acceleration.row(i).allFinite()) continue;
+      const bool known = std::isfinite(y) && std::isfinite(s.acceleration[i]) &&
+                         tip.acceleration.row(i).allFinite();
+      if (!known || s.rate[i] == 0.0) continue;  // at a dead centre a force holds no load
       c.beyond[j] = y;
       c.per_pull.row(j) = tip.jacobian.row(i).segment<3>(Index{3} * joint) *
                           (machine.tip.payload_scale * log.payload[i] / s.rate[i]);

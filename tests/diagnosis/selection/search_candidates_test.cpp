@@ -1,0 +1,98 @@
+#include "diagnosis/selection/search_candidates.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "diagnosis/selection/effect_estimate.h"
+#include "models/effects/registry.h"
+#include "tests/diagnosis/evidence_support.h"
+#include "tests/diagnosis/hidden_case.h"
+
+namespace sparflow {
+namespace {
+
+using namespace testing_support;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// A force in proportion to time, of which each log is said to tell further values.
+class TimeForce final : public Effect {
+ public:
+  explicit TimeForce(int values) : values_(values) {}
+  const EffectInfo& info() const override {
+    static const EffectInfo info = [] {
+      EffectInfo i;
+      i.id = "force_of_time";
+      i.place = EffectPlace::kMachine;
+      i.parameters = {{"slope", "N/s", 1.0, 0.0, 10.0, 1.0, "", true, {}}};
+      return i;
+    }();
+    return info;
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
+  bool columns_filtered() const override { return true; }  // no filter in a hand-made log
+  int values_from_measurement(const MachineSeries&) const override { return values_; }
+  bool columns(const MachineSeries& log, const MeasuredQuantity&, int, std::span<const double>,
+               MatrixXd& columns) const override {
+    columns = log.time;
+    return true;
+  }
+
+ private:
+  int values_;
+};
+
+/// Two suspect logs and a reference, with a channel of the first.
+Evidence two_suspects() {
+  const std::vector<NoiseBlock> blocks = blocks_of({100, 100});
+  const Index n = rows_of(blocks);
+  Evidence e;
+  e.suspects = 2;
+  e.series.resize(3);
+  for (MachineSeries& s : e.series) {
+    s.time = VectorXd::LinSpaced(n, 0.0, 4.0);
+    s.step = s.time[1];
+    s.runs = {{0, n}};
+  }
+  EvidenceChannel c = plain_channel(blocks, VectorXd::Zero(n));
+  for (Index i = 0; i < n; ++i) c.sample.push_back(i);
+  e.channels.push_back(c);
+  return e;
+}
+
+TEST(SearchCandidates, ValuesThatALogTellsCountAsParametersOfEachSuspectLog) {
+  const Evidence e = two_suspects();
+  const TimeForce plain(0), told(4);
+  const std::vector<SearchCandidate> all = search_candidates(e, {{&plain, -1}, {&told, -1}});
+  ASSERT_EQ(all.size(), 2U);
+  const double each = 0.5 * std::log(static_cast<double>(e.channels[0].rows()));
+  EXPECT_DOUBLE_EQ(all[0].penalty, each);
+  EXPECT_DOUBLE_EQ(all[1].penalty, each * (1 + 2 * 4));
+}
+
+/// The estimate stays beside the grid's values when it may not leave them; a start between them is one more.
+TEST(EffectEstimate, TriesTheStartsBesideTheGrid) {
+  const Machine machine = drawn_machine("loader_crane");
+  const HiddenCase logs = hidden_case(machine, {{"sensor_delay", "", 1.0, 0}}, {5, 60.0});
+  const double truth = logs.truth("sensor_delay", "delay");
+  const CraneModel model = CraneModel::untrained(machine);
+  const EffectAt delay = parse_effect("sensor_delay", machine);
+  EstimateOptions beside_grid;
+  beside_grid.largest_step = 1.001;
+  EstimateOptions started = beside_grid;
+  started.starts = {{truth, 1.0}};
+  const auto estimate = [&](const EstimateOptions& how) {
+    return estimate_effects(model, {delay}, {{make_signals(machine, logs.train)}}, {}, how);
+  };
+  const EffectEstimate grid = estimate(beside_grid), start = estimate(started);
+  // values: share, delay, late
+  ASSERT_GT(std::abs(grid.effects[0].values[1] - truth), 0.003 * truth)
+      << "this seed's delay lies on the grid, so that the test shows nothing";
+  EXPECT_NEAR(start.effects[0].values[1], truth, 0.0011 * truth);
+  EXPECT_GT(start.log_likelihood, grid.log_likelihood);
+}
+
+}  // namespace
+}  // namespace sparflow
