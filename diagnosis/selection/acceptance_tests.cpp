@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/search_state.h"
@@ -63,6 +64,12 @@ std::string why_not_named(const FoundEffect& found, const SearchOptions& options
                        found.held_out, found.held_out_error);
   }
   return {};
+}
+
+bool passes_without_form_error(FoundEffect found, const SearchOptions& options,
+                               const Mechanisms& mechanisms) {
+  found.over_form = std::numeric_limits<double>::max();
+  return why_not_named(found, options, mechanisms).empty();
 }
 
 }  // namespace sparflow

@@ -16,4 +16,8 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
 std::string why_not_named(const FoundEffect& found, const SearchOptions& options,
                           const Mechanisms& mechanisms);
 
+/// Whether an effect would pass all acceptance tests if the laws of the others had no model-form error.
+bool passes_without_form_error(FoundEffect found, const SearchOptions& options,
+                               const Mechanisms& mechanisms);
+
 }  // namespace sparflow

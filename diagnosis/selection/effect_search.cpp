@@ -38,8 +38,10 @@ class Search {
       select(found, current, result);
       if (result.updated_evidence) return result;
       bool reshaped = false;
-      for (std::size_t i = 0; i < found.size(); ++i)
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        reshaped = exchange(search_, found, i, current) || reshaped;
         reshaped = reshape(search_, found, i, current) || reshaped;
+      }
       relinearise(found, current);
       while (search_.mechanisms().enabled(Mechanism::kMerge) && merge(search_, found, current)) {
       }
@@ -142,8 +144,10 @@ class Search {
             best.gain > search_.options.surely_something * search_.options.least_gain) {
           result.unnamed.push_back(found.back());
         }
+        const FoundEffect refused = std::move(found.back());
         found.pop_back();
-        search_.refused[best.candidate] = true;
+        search_.refuse(best.candidate, refused, found,
+                       passes_without_form_error(refused, search_.options, search_.mechanisms()));
         continue;
       }
       current = next;
@@ -280,8 +284,10 @@ class Search {
           fmt::format("{} is removed again: {}", search_.key(found[i].design.effect), why));
       if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
       for (std::size_t c = 0; c < search_.candidates.size(); ++c) {
-        if (search_.candidates[c].effect == found[i].design.effect) search_.refused[c] = true;
+        if (search_.candidates[c].effect == found[i].design.effect)
+          search_.refuse(c, found[i], {}, false);
       }
+      search_.allow_beside(found[i].design.effect);
       found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
       current = search_.fit(designs_of(found));
       return true;

@@ -111,6 +111,33 @@ bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::si
   return true;
 }
 
+bool exchange(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+              EffectFit& current) {
+  std::vector<bool> skip = search.skipped(found);
+  for (std::size_t k = 0; k < skip.size(); ++k) skip[k] = skip[k] || !search.judged_anew[k];
+  if (std::find(skip.begin(), skip.end(), false) == skip.end()) return false;
+  const std::vector<const EffectDesign*> others = designs_of(found, i);
+  const EffectFit without = fit_effects(search.evidence, others, &current, {});
+  const EffectDesign& place = found[i].design;
+  const std::vector<CandidateScore> scores = search.scores.instead_of(place, others, without, skip);
+  const double least = search.scores.gain_instead(place, place, others, without) -
+                       search.penalty_of(place) + search.options.least_reshape_gain;
+  if (scores.empty() || scores.front().gain < least) return false;
+  std::vector<FoundEffect> with = found;
+  with[i] = {};
+  with[i].design = search.scores.refined(others, scores.front(), without);
+  with[i].p_value = found[i].p_value;
+  EffectFit fit = search.fit(designs_of(with));
+  search.judge(with, i, fit);
+  if (!why_not_named(with[i], search.options, search.mechanisms()).empty()) return false;
+  if (tracing())
+    fmt::print(stderr, "  {} takes the place of {}\n", search.key(with[i].design.effect),
+               search.key(place.effect));
+  found = std::move(with);
+  current = std::move(fit);
+  return true;
+}
+
 void list_rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
                  const EffectFit& current) {
   FoundEffect& f = found[i];

@@ -14,6 +14,11 @@ bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit
 bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
              EffectFit& current);
 
+/// Replaces an effect by one that explains more and had been refused only beside the model-form error of an effect that is no
+/// longer found. @return whether found[i] was replaced
+bool exchange(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
+              EffectFit& current);
+
 /// Lists the rivals of found[i] in FoundEffect::alternatives.
 void list_rivals(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
                  const EffectFit& current);

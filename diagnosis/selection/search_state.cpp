@@ -23,7 +23,9 @@ SearchState::SearchState(const Evidence& e, const std::vector<EffectAt>& effects
       progress(p),
       candidates(search_candidates(e, effects)),
       scores(e, candidates, o),
-      refused(candidates.size(), false) {}
+      refused(candidates.size(), false),
+      refused_beside(candidates.size()),
+      judged_anew(candidates.size(), false) {}
 
 void SearchState::report(std::size_t found, const std::string& what) const {
   if (progress) progress(std::min(0.9, 0.15 + 0.2 * static_cast<double>(found)), what);
@@ -45,6 +47,25 @@ bool SearchState::meet(const EffectDesign& a, const EffectDesign& b) const {
   for (std::size_t c = 0; c < evidence.channels.size(); ++c)
     both = both || (a.touches(c) && b.touches(c));
   return both;
+}
+
+void SearchState::refuse(std::size_t candidate, const FoundEffect& tested,
+                         const std::vector<FoundEffect>& found, bool form_error_alone) {
+  refused[candidate] = true;
+  refused_beside[candidate].clear();
+  if (!form_error_alone) return;
+  for (const FoundEffect& f : found)
+    if (meet(f.design, tested.design)) refused_beside[candidate].push_back(f.design.effect);
+}
+
+void SearchState::allow_beside(const EffectAt& removed) {
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const std::vector<EffectAt>& beside = refused_beside[k];
+    if (std::find(beside.begin(), beside.end(), removed) == beside.end()) continue;
+    refused[k] = false;
+    refused_beside[k].clear();
+    judged_anew[k] = true;
+  }
 }
 
 std::vector<bool> SearchState::skipped(const std::vector<FoundEffect>& found) const {

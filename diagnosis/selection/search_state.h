@@ -23,6 +23,9 @@ struct SearchState {
   std::vector<SearchCandidate> candidates;
   SearchScores scores;
   std::vector<bool> refused;  ///< by candidate: failed an acceptance test in this search
+  /// By candidate: the effects beside whose model-form error alone it was refused.
+  std::vector<std::vector<EffectAt>> refused_beside;
+  std::vector<bool> judged_anew;  ///< by candidate: such a refusal has become void
 
   const Mechanisms& mechanisms() const { return evidence.options.mechanisms; }
   void report(std::size_t found, const std::string& what) const;
@@ -35,6 +38,11 @@ struct SearchState {
   bool meet(const EffectDesign& a, const EffectDesign& b) const;
   /// By candidate: whether it was refused before or is found already.
   std::vector<bool> skipped(const std::vector<FoundEffect>& found) const;
+  /// Refuses a candidate that fails an acceptance test beside what was found, of which it is not yet a part.
+  void refuse(std::size_t candidate, const FoundEffect& tested,
+              const std::vector<FoundEffect>& found, bool form_error_alone);
+  /// Makes the refusals void that rest on the model-form error of an effect that is no longer found.
+  void allow_beside(const EffectAt& removed);
   /// Computes the statistics of the acceptance tests of found[index]. @param fit of all found
   void judge(std::vector<FoundEffect>& found, std::size_t index, const EffectFit& fit) const;
   /// Fit with residuals and covariance, its noise models iterated to convergence.

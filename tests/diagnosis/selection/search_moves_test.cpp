@@ -71,5 +71,96 @@ TEST(SearchMoves, AVariantOnTheBoundOfItsRangeDoesNotTakeThePlace) {
   EXPECT_NE(pump.form_after(), 3.0);
 }
 
+/// A force that swings at one of three frequencies.
+class Course final : public Effect {
+ public:
+  explicit Course(int which) : which_(which) {}
+  const EffectInfo& info() const override {
+    static const EffectInfo info = [] {
+      EffectInfo i;
+      i.id = "force_of_a_course";
+      i.place = EffectPlace::kMachine;
+      i.parameters = {{"size", "N", 1.0, -100.0, 100.0, 1.0, "", true, {}}};
+      return i;
+    }();
+    return info;
+  }
+  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
+  bool columns_filtered() const override { return true; }  // no filter in a hand-made log
+  bool columns(const MachineSeries& log, const MeasuredQuantity&, int, std::span<const double>,
+               Eigen::MatrixXd& columns) const override {
+    const Eigen::ArrayXd t = log.time.array();
+    columns = Eigen::sin((which_ == 0 ? 3.0 : which_ == 1 ? 3.3 : 8.0) * t);
+    return true;
+  }
+
+ private:
+  int which_;
+};
+
+/// The first course acts. The second, which resembles it, was found while the first was refused beside the third.
+struct Refused {
+  Course first{0}, second{1}, third{2};
+  Evidence evidence;
+  SearchOptions options;
+  SearchProgress progress;
+
+  Refused() {
+    const std::vector<NoiseBlock> blocks =
+        testing_support::blocks_of(std::vector<Eigen::Index>(10, 50));
+    const Eigen::Index n = testing_support::rows_of(blocks);
+    std::mt19937_64 random(6);
+    evidence.suspects = 1;
+    evidence.series.resize(1);
+    MachineSeries& s = evidence.series[0];
+    s.time = Eigen::VectorXd::LinSpaced(n, 0.0, 5.0);
+    s.step = s.time[1];
+    s.runs = {{0, n}};
+    EvidenceChannel c = testing_support::plain_channel(
+        blocks, Eigen::VectorXd(2.0 * (3.0 * s.time.array()).sin().matrix() +
+                                testing_support::white(n, random)));
+    for (Eigen::Index i = 0; i < n; ++i) c.sample.push_back(i);
+    evidence.channels.push_back(c);
+  }
+  std::vector<EffectAt> all() const { return {{&first, -1}, {&second, -1}, {&third, -1}}; }
+  FoundEffect of(const Course& course) const {
+    FoundEffect f;
+    f.design = make_design(evidence, {&course, -1}, {});
+    return f;
+  }
+};
+
+TEST(SearchMoves, ARefusalForModelFormErrorIsVoidWithoutTheEffectThatHasIt) {
+  const Refused r;
+  SearchState search(r.evidence, r.all(), r.options, r.progress);
+  search.refuse(0, r.of(r.first), {r.of(r.third)}, true);
+  search.refuse(1, r.of(r.second), {r.of(r.third)}, false);
+  EXPECT_TRUE(search.skipped({})[0]);
+  search.allow_beside({&r.second, -1});
+  EXPECT_TRUE(search.skipped({})[0]) << "this one was not found then";
+  search.allow_beside({&r.third, -1});
+  EXPECT_FALSE(search.skipped({})[0]);
+  EXPECT_TRUE(search.skipped({})[1]) << "it had failed another test";
+}
+
+TEST(SearchMoves, AnEffectWhoseRefusalIsVoidTakesThePlaceOfOneThatExplainsLess) {
+  const Refused r;
+  SearchState search(r.evidence, r.all(), r.options, r.progress);
+  const auto after = [&] {
+    std::vector<FoundEffect> found{r.of(r.second)};
+    EffectFit current = search.fit(designs_of(found));
+    exchange(search, found, 0, current);
+    return found[0].design.effect.effect;
+  };
+  EXPECT_EQ(after(), &r.second) << "nothing has been refused";
+  search.refuse(0, r.of(r.first), {r.of(r.third)}, true);
+  search.refuse(2, r.of(r.third), {r.of(r.first)}, true);
+  EXPECT_EQ(after(), &r.second) << "the refusals hold";
+  search.allow_beside({&r.first, -1});
+  EXPECT_EQ(after(), &r.second) << "the third explains less";
+  search.allow_beside({&r.third, -1});
+  EXPECT_EQ(after(), &r.first);
+}
+
 }  // namespace
 }  // namespace sparflow
