@@ -59,11 +59,11 @@ std::optional<Evidence> Evidence::with_leaders_of(std::span<const AppliedEffect>
     for (std::size_t log = 0; log < series.size(); ++log) {
       const PumpSeries& before = series[log].pumps[p];
       if (before.demand.size() == 0 || before.pressure.size() == 0) continue;
-      const VectorXd less = before.demand - pumps[log][p].demand;
+      const VectorXd less = before.demand - pumps[log][p].demand +
+                            known(log, channel.kind, channel.index) -
+                            out.known(log, channel.kind, channel.index);
       if (log < channel.raw.size() && channel.raw[log].size() > 0) channel.raw[log] += less;
-      const VectorXd y = filter(log, channel.kind,
-                                less + known(log, channel.kind, channel.index) -
-                                    out.known(log, channel.kind, channel.index));
+      const VectorXd y = filter(log, channel.kind, less);
       const MatrixXd base = out.margins(log, channel.index);
       for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
         if (channel.log[b] != static_cast<int>(log)) continue;

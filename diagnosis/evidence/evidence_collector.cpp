@@ -293,11 +293,10 @@ void EvidenceCollector::add_force_channel(int cylinder) {
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_force()) continue;
-    const VectorXd y = e.filter(log, EvidenceKind::kForce,
-                                c.force - e.known(log, EvidenceKind::kForce, cylinder)) -
-                       c.static_force;
+    const VectorXd beyond = c.force - e.known(log, EvidenceKind::kForce, cylinder);
+    const VectorXd y = e.filter(log, EvidenceKind::kForce, beyond) - c.static_force;
     b.channel.raw.resize(signals_.size());
-    b.channel.raw[log] = c.force - c.static_force;
+    b.channel.raw[log] = beyond - c.static_force;
     for (const double f : c.static_force) {
       if (std::isfinite(f))
         b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
@@ -426,14 +425,13 @@ void EvidenceCollector::add_pump_channel(int pump) {
     const PumpSignals& s = signals_[log]->pumps[at];
     const PumpSeries& series = e.series[log].pumps[at];
     if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
-    const VectorXd y =
-        e.filter(log, EvidenceKind::kPump,
-                 s.pressure - series.demand - e.known(log, EvidenceKind::kPump, pump));
+    const VectorXd beyond = s.pressure - series.demand - e.known(log, EvidenceKind::kPump, pump);
+    const VectorXd y = e.filter(log, EvidenceKind::kPump, beyond);
     const Mask follows = below_cut_off(model_.machine.pumps[at], *signals_[log], s.pressure_smooth);
     b.add(log, signals_[log]->usable && !signals_[log]->edge && follows, y, e.margins(log, pump),
           0);
     b.channel.raw.resize(signals_.size());
-    b.channel.raw[log] = s.pressure - series.demand;
+    b.channel.raw[log] = beyond;
     if (is_suspect(log)) noise.add(s.pressure, gain_pressure_[log]);
   }
   b.channel.noise_floor = noise.value();

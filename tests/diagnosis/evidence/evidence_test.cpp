@@ -10,6 +10,7 @@
 
 #include "diagnosis/regression/effect_fit.h"
 #include "diagnosis/selection/search_candidates.h"
+#include "identification/signals/series.h"
 #include "models/effects/registry.h"
 #include "tests/diagnosis/hidden_case.h"
 #include "tests/identification/arm_log.h"
@@ -73,6 +74,26 @@ Log rippling_log(double force_scale, double rate) {
         fmt::format("{:.4f},{:.10f},{:.10f},{:.8f}\n", t, q, v / kGain, force_scale * kMass * a);
   }
   return log_from_text("ripples.csv", text, carriage());
+}
+
+/// Oscillations are searched before the filter: what the model's effects explain is none of them.
+TEST(Evidence, ForcesBeforeTheFilterAreBeyondTheModelsEffects) {
+  CraneModel model = CraneModel::untrained(carriage());
+  const MachineSignals signals = make_signals(model.machine, rippling_log(1.0, 50.0));
+  const Evidence plain = collect_evidence(model, {signals});
+  const AppliedEffect inertia = {find_effect("inertia"), -1, {1.0}, {}, {}};
+  model.effects = {inertia};
+  const Evidence known = collect_evidence(model, {signals});
+  const VectorXd& before = plain.find(EvidenceKind::kForce, 0)->raw[0];
+  const VectorXd& after = known.find(EvidenceKind::kForce, 0)->raw[0];
+  const VectorXd explained = effect_series(inertia, known.series[0], EvidenceKind::kForce, 0);
+  double most = 0.0;
+  for (Index k = 0; k < before.size(); ++k) {
+    if (!std::isfinite(explained[k])) continue;
+    EXPECT_NEAR(before[k] - after[k], explained[k], 1e-9) << k;
+    most = std::max(most, std::abs(explained[k]));
+  }
+  EXPECT_GT(most, 5.0) << "[N] the carriage hardly accelerates, so that this shows nothing";
 }
 
 class MatchedFilters : public testing::TestWithParam<std::pair<double, double>> {};
