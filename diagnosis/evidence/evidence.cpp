@@ -110,6 +110,10 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
         }));
       }
     }
+    const Eigen::MatrixXd inertial =
+        inertial_columns(*effect.effect, series[log], {channel.kind, channel.index}, effect.at);
+    if (inertial.size() > 0)
+      raw += inertial.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
     if (result.size() == 0) result.setZero(channel.rows(), raw.cols());
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
       if (channel.log[b] != static_cast<int>(log)) continue;

@@ -137,6 +137,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
     }
   }
   set_static_slopes(machine, out);
+  for (const AppliedEffect& e : model.effects) out.inertia += e.effect->inertial_share(e.values);
   if (machine.tip.joint >= 0) out.tip = tip_motion(out);
   out = with_openings(model.effects, std::move(out));
   for (std::size_t p = 0; p < machine.pumps.size(); ++p) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "models/effects/instant.h"
+#include "models/machine/inertial_torque.h"
 #include "models/machine/static_force.h"
 
 namespace sparflow {
@@ -29,6 +30,36 @@ Matrix forces_of(const Machine& machine, const MachineSeries& log) {
     result.row(i) = statics.force().transpose();
   }
   return result;
+}
+
+/// Inertial force of one cylinder over a log, for the whole of the machine's masses. [N]
+Eigen::VectorXd inertial_forces_of(const Machine& machine, const MachineSeries& log, int cylinder) {
+  const auto c = static_cast<std::size_t>(cylinder);
+  const int joint = machine.cylinders[c].joint;
+  Eigen::VectorXd result =
+      Eigen::VectorXd::Constant(log.samples(), std::numeric_limits<double>::quiet_NaN());
+  Eigen::VectorXd q, qd, qdd;
+  for (Eigen::Index i = 0; i < log.samples(); ++i) {
+    q = log.q.row(i);
+    qd = log.qd.row(i);
+    qdd = log.qdd.row(i);
+    if (!q.allFinite() || !qd.allFinite() || !qdd.allFinite()) continue;
+    try {
+      result[i] = inertial_torque<double>(machine, q, qd, qdd, log.payload[i])[joint] /
+                  log.cylinders[c].rate[i];
+    } catch (const std::domain_error&) {
+      continue;  // a four-bar does not close
+    }
+  }
+  return result;
+}
+
+/// Typical values of an effect's linear parameters, which come first. [SI]
+std::vector<double> typical_changes(const Effect& effect) {
+  std::vector<double> sizes;
+  for (const EffectParameter& parameter : effect.info().parameters)
+    if (parameter.linear) sizes.push_back(parameter.typical);
+  return sizes;
 }
 
 }  // namespace
@@ -143,6 +174,24 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
     }
   }
   return any;
+}
+
+Matrix inertial_columns(const Effect& effect, const MachineSeries& log,
+                        const MeasuredQuantity& measured, int at) {
+  if (!effect.changes_machine() || measured.kind != EvidenceKind::kForce || log.inertia == 0.0)
+    return {};
+  const Eigen::VectorXd nominal = inertial_forces_of(*log.machine, log, measured.index);
+  const std::vector<double> sizes = typical_changes(effect);
+  Matrix columns(log.samples(), static_cast<Eigen::Index>(sizes.size()));
+  for (std::size_t k = 0; k < sizes.size(); ++k) {
+    std::vector<double> values(effect.info().parameters.size(), 0.0);
+    values[k] = sizes[k];
+    Machine changed = *log.machine;
+    effect.change_machine(changed, at, values);
+    columns.col(static_cast<Eigen::Index>(k)) =
+        log.inertia * (inertial_forces_of(changed, log, measured.index) - nominal) / sizes[k];
+  }
+  return columns;
 }
 
 std::string effect_key(const EffectInfo& info, const Machine& machine, int at) {

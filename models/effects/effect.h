@@ -134,6 +134,9 @@ class Effect {
                         std::span<double>) const {}
   virtual void add_pump(const Instant<Jet>&, int, std::span<const double>, std::span<Jet>) const {}
 
+  /// Share of the machine's inertial forces that this effect stands for. [-]
+  virtual double inertial_share(std::span<const double> /*p*/) const { return 0.0; }
+
   /// Largest flow that this effect permits pump `pump` [m^3/s], infinity = not limited; motions stay below it.
   virtual double flow_limit(const Machine& /*machine*/, int /*pump*/, int /*at*/,
                             std::span<const double> /*p*/) const {
@@ -201,6 +204,13 @@ struct AppliedEffect {
   std::vector<double> lower95, upper95;           ///< [SI] intervals; empty = not known
   std::string key(const Machine& machine) const;  ///< "coulomb_friction:boom"
 };
+
+/// Columns of what the masses that an effect changes add to a cylinder's inertial force, beside the static force that
+/// Effect::columns() contain. They come from filtered accelerations and must not be filtered again. Empty: the effect changes no
+/// machine, the quantity is no force, or the model has no inertial forces (MachineSeries::inertia).
+/// @return [samples x linear parameters], [N] for each unit (SI) of a parameter; NaN where a pose or an acceleration is not known
+Eigen::MatrixXd inertial_columns(const Effect& effect, const MachineSeries& log,
+                                 const MeasuredQuantity& measured, int at);
 
 /// "id:at" or "id". @param at -1 = machine
 std::string effect_key(const EffectInfo& info, const Machine& machine, int at);

@@ -80,6 +80,8 @@ struct MachineSeries {
   Eigen::VectorXd payload;                                  ///< [kg]
   Eigen::VectorXd oil;                                      ///< [degC]
   Eigen::VectorXd return_pressure;  ///< [Pa] of the common return line; empty: not measured
+  /// [-] Share of the machine's inertial forces that the model's effects contain; a changed mass changes this share of them as well.
+  double inertia = 0.0;
   TipMotion tip;
   std::vector<CylinderSeries> cylinders;
   std::vector<PumpSeries> pumps;

@@ -1,6 +1,7 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling] [-v] [--json FILE] [--logs FOLDER]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling] [-v]
+//     [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -23,6 +24,7 @@
 #include "simulator/programmes/programmes.h"
 #include "simulator/random/random.h"
 #include "simulator/sensors/log_writer.h"
+#include "studies/plants/change_in_noise.h"
 #include "studies/plants/drawn_plant.h"
 #include "studies/share.h"
 #include "studies/trust/said_effect.h"
@@ -40,6 +42,10 @@ struct Arguments {
   std::string only, json, logs;
   bool no_reference = false, without_settling = false, without_support = false, verbose = false;
 };
+
+/// Change of a channel over its sensor's noise below which a change is counted as one that no log of this length shows.
+/// @threshold [1] 0.1..10; chosen: in one stretch of 4 s at least, the change is as large as what the sensor scatters
+constexpr double kVisible = 1.0;
 
 /// A change of the plant, with what may be named for it.
 struct Change {
@@ -67,11 +73,11 @@ const std::vector<Change>& changes() {
   return all;
 }
 
-/// A log of the plant at an operator's work. @param told factor of the payload that the log tells
-std::string plant_log(const Machine& machine, const PlantParameters& p, std::uint64_t seed,
-                      double seconds, double told) {
+/// The plant at an operator's work.
+std::vector<plant::Record> worked(const Machine& machine, const PlantParameters& p,
+                                  std::uint64_t seed, double seconds) {
   const auto work = plant::operator_work(machine, p, {seed, seconds, 0.02, std::nullopt});
-  plant::LogWriter log(machine, p, seed, "");
+  std::vector<plant::Record> records;
   plant::PlantRun run(machine, p, work->start(), work->start_payload());
   while (run.time() < seconds && run.status() == plant::RunStatus::kRunning) {
     const plant::ProgrammeStep step = work->step(run.record());
@@ -79,12 +85,22 @@ std::string plant_log(const Machine& machine, const PlantParameters& p, std::uin
     if (step.payload) run.set_payload(*step.payload);
     plant::Record row = run.record();
     row.command = step.command;
-    row.payload *= told;
-    log.add(row);
+    records.push_back(std::move(row));
     run.advance(step.command);
   }
   if (run.status() != plant::RunStatus::kRunning)
     throw InputError({}, "plant", "the run ended early: " + run.message());
+  return records;
+}
+
+/// The log of this work. @param told factor of the payload that the log tells
+std::string log_of(const Machine& machine, const PlantParameters& p,
+                   std::vector<plant::Record> records, std::uint64_t seed, double told) {
+  plant::LogWriter log(machine, p, seed, "");
+  for (plant::Record& row : records) {
+    row.payload *= told;
+    log.add(row);
+  }
   return log.text("");
 }
 
@@ -93,6 +109,7 @@ struct Case {
   std::string machine, change, at, verdict, answer, left_out;
   bool right = false;
   double seconds = 0.0;
+  ChangeInNoise shows;  ///< how far the hidden change shows at all
   std::vector<SaidEffect> said;
 };
 
@@ -173,7 +190,8 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
                            row.unit);
     }
     const auto log = [&](const PlantParameters& p, std::uint64_t work, double factor) {
-      const std::string text = plant_log(machine, p, 100 * seed + work, a.seconds, factor);
+      const std::uint64_t own = 100 * seed + work;
+      const std::string text = log_of(machine, p, worked(machine, p, own, a.seconds), own, factor);
       const std::string file = fmt::format("plant{}_work{}.csv", seed, work);
       if (!a.logs.empty()) std::ofstream(a.logs + "/" + file) << text;
       return log_from_text(file, text, machine);
@@ -196,6 +214,9 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       const Diagnosis d =
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
       judge(d, clean ? Hidden{} : hidden, c);
+      if (!clean)
+        c.shows = change_in_noise(machine, {as_built, changed, told},
+                                  worked(machine, changed, 100 * seed + 3, a.seconds), seed);
       c.seconds = d.seconds;
       if (a.verbose && !clean) c.answer += "(" + values + ")";
       if (a.verbose) c.answer += "\n" + d.table();
@@ -216,7 +237,9 @@ std::string packed(const std::vector<Case>& cases) {
   Packer p;
   p.number(static_cast<double>(cases.size()));
   for (const Case& c : cases) {
-    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, said] = c;
+    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, shows,
+                 said] = c;
+    p.text(shows.channel).number(shows.ratio);
     p.number(static_cast<double>(seed)).text(machine).text(change).text(at).text(verdict);
     p.text(answer).text(left_out).number(right ? 1.0 : 0.0).number(seconds);
     p.number(static_cast<double>(said.size()));
@@ -232,7 +255,9 @@ std::vector<Case> unpacked_cases(const std::string& bytes) {
   Unpacker u(bytes);
   std::vector<Case> cases(static_cast<std::size_t>(u.number()));
   for (Case& c : cases) {
-    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, said] = c;
+    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, shows, said] = c;
+    shows.channel = u.text();
+    shows.ratio = u.number();
     seed = static_cast<std::uint64_t>(u.number());
     for (std::string* text : {&machine, &change, &at, &verdict, &answer, &left_out})
       *text = u.text();
@@ -250,6 +275,10 @@ std::vector<Case> unpacked_cases(const std::string& bytes) {
   return cases;
 }
 
+std::string noise_text(const ChangeInNoise& c) {
+  return c.channel.empty() ? std::string() : fmt::format("{:.2g} {}", c.ratio, c.channel);
+}
+
 int run(const Arguments& a, Journal& journal) {
   std::mutex mutex;
   std::vector<Case> all;
@@ -263,24 +292,33 @@ int run(const Arguments& a, Journal& journal) {
         fmt::print("  left out: {} {}: {}\n", c.seed, c.machine, c.left_out);
         continue;
       }
-      fmt::print("{} {:4} {:13} {:32} {:8} {}\n", c.right ? " " : "X", c.seed, c.machine,
-                 c.at.empty() ? c.change : c.change + ":" + c.at, c.verdict, c.answer);
+      fmt::print("{} {:4} {:13} {:32} {:12} {:8} {}\n", c.right ? " " : "X", c.seed, c.machine,
+                 c.at.empty() ? c.change : c.change + ":" + c.at, noise_text(c.shows), c.verdict,
+                 c.answer);
       std::fflush(stdout);
       all.push_back(std::move(c));
     }
   });
   nlohmann::json json;
   for (const bool clean : {false, true}) {
-    int right = 0, count = 0, bad = 0;
+    int right = 0, count = 0, bad = 0, visible = 0, visible_right = 0;
     for (const Case& c : all) {
       if ((c.change == "none") != clean) continue;
       ++count;
       right += c.right ? 1 : 0;
       bad += c.verdict == "bad_data" ? 1 : 0;
+      if (c.shows.ratio < kVisible) continue;
+      ++visible;
+      visible_right += c.right ? 1 : 0;
     }
     const char* row =
         clean ? "nothing changed: verdict none" : "change named, nothing untrue beside it";
     fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
+    if (!clean) {
+      fmt::print("{:42} {:3} of {:3}\n", "  of these, above a sensor's noise", visible_right,
+                 visible);
+      json["visible"] = {{"right", visible_right}, {"cases", visible}, {"least_ratio", kVisible}};
+    }
     json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
   }
   std::vector<SaidEffect> said;

@@ -41,6 +41,7 @@ class Inertia final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kForce}; }
   bool columns_filtered() const override { return true; }
+  double inertial_share(std::span<const double> p) const override { return p[0]; }
 
   template <class T>
   void add_force_law(const Instant<T>& s, int, std::span<const double> p, std::span<T> out) const {

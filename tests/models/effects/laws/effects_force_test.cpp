@@ -212,6 +212,82 @@ TEST(AngleOffset, ShowsInTheSpeedOfItsOwnRod) {
   EXPECT_FALSE(e.columns(log, {EvidenceKind::kFlow, 1}, 0, {}, column));
 }
 
+/// What an effect that changes the machine adds to a cylinder's inertial force, from the changed machine itself.
+VectorXd inertial_difference(const AppliedEffect& e, const MachineSeries& log, int cylinder) {
+  Machine changed = *log.machine;
+  e.effect->change_machine(changed, e.at, e.values);
+  const int joint = changed.cylinders[static_cast<std::size_t>(cylinder)].joint;
+  VectorXd out(log.samples());
+  for (Index k = 0; k < log.samples(); ++k) {
+    const VectorXd q = log.q.row(k), qd = log.qd.row(k), qdd = log.qdd.row(k);
+    const auto torque = [&](const Machine& machine) {
+      return inertial_torque<double>(machine, q, qd, qdd, log.payload[k])[joint];
+    };
+    out[k] = (torque(changed) - torque(*log.machine)) /
+             linkage_rates(changed, cylinder, log.q(k, joint)).d1;
+  }
+  return out;
+}
+
+TEST(InertialColumns, MassesAddTheShareOfTheirInertiaThatTheModelHas) {
+  const Machine machine = test_support::loader_crane();
+  MachineSeries log = swinging_log(machine);
+  const Effect& payload = effect("payload_error");
+  EXPECT_EQ(inertial_columns(payload, log, {EvidenceKind::kForce, 0}, -1).size(), 0)
+      << "the model has no inertial forces";
+  log.inertia = 0.6;
+  EXPECT_EQ(inertial_columns(payload, log, {EvidenceKind::kFlow, 0}, -1).size(), 0);
+  EXPECT_EQ(inertial_columns(effect("coulomb_friction"), log, {EvidenceKind::kForce, 0}, 0).size(),
+            0);
+  const std::vector<double> values = {80.0, 0.1};
+  for (int i = 0; i < 2; ++i) {
+    const MatrixXd columns = inertial_columns(payload, log, {EvidenceKind::kForce, i}, -1);
+    ASSERT_EQ(columns.cols(), 2);
+    const VectorXd sum = columns.col(0) * values[0] + columns.col(1) * values[1];
+    const VectorXd law = 0.6 * inertial_difference({&payload, -1, values, {}, {}}, log, i);
+    // point masses at the tip enter the inertial force linearly
+    EXPECT_LT((sum - law).cwiseAbs().maxCoeff(), 1e-9 * law.cwiseAbs().maxCoeff());
+    EXPECT_GT(law.cwiseAbs().maxCoeff(), 1.0);
+  }
+}
+
+/// A moment whose mass is not determined has the inertia of a mass at the link's end, and one with a mass on the link that of
+/// this mass; the static force is the same.
+TEST(UnmodelledMass, MomentOfInertiaIsThatOfAMassOnTheLink) {
+  const Machine machine = test_support::loader_crane();
+  const Effect& mass = effect("unmodelled_mass");
+  const int joint = 1;
+  MachineSeries log = swinging_log(machine);
+  for (int k = 0; k < machine.joint_count(); ++k) {
+    if (k == joint) continue;  // it moves alone, so that its own moment of inertia is all there is
+    log.qd.col(k).setZero();
+    log.qdd.col(k).setZero();
+  }
+  const double length = machine.joints[2].origin.translation().norm(), moment = 90.0;
+  const auto at_distance = [&](double d) {
+    return AppliedEffect{&mass, joint, {moment / d, moment, 0.0}, {}, {}};
+  };
+  const AppliedEffect unknown{&mass, joint, {0.0, moment, 0.0}, {}, {}};
+  const AppliedEffect beyond{&mass, joint, {0.01, moment, 0.0}, {}, {}};
+  const AppliedEffect couple{&mass, joint, {0.0, 0.0, moment}, {}, {}};
+  const int cylinder = 1;
+  ASSERT_EQ(machine.cylinders[cylinder].joint, joint);
+  const VectorXd end = inertial_difference(at_distance(length), log, cylinder);
+  const double scale = end.cwiseAbs().maxCoeff();
+  EXPECT_LT((inertial_difference(unknown, log, cylinder) - end).cwiseAbs().maxCoeff(),
+            1e-9 * scale);
+  EXPECT_LT((inertial_difference(beyond, log, cylinder) - end).cwiseAbs().maxCoeff(), 1e-3 * scale);
+  const VectorXd half = inertial_difference(at_distance(0.5 * length), log, cylinder);
+  EXPECT_LT((half - 0.5 * end).cwiseAbs().maxCoeff(), 1e-9 * scale);  // moment times distance
+  EXPECT_LT(inertial_difference(couple, log, cylinder).cwiseAbs().maxCoeff(), 1e-9 * scale);
+  const VectorXd q = log.q.row(5).transpose();
+  const VectorXd before = static_force<double>(machine, q, 0.0);
+  const VectorXd near = changed_force(machine, at_distance(0.5 * length), q, 0.0) - before;
+  const VectorXd far = changed_force(machine, unknown, q, 0.0) - before;
+  EXPECT_NEAR(near[cylinder], far[cylinder], 1e-9 * std::abs(far[cylinder]));
+  EXPECT_GT(std::abs(far[cylinder]), 1.0);
+}
+
 // --- over the registry ---------------------------------------------------------------------------------------
 
 TEST(ForceEffects, JetsAgreeWithNumericDerivatives) {
