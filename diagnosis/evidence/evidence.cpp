@@ -88,9 +88,13 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   Eigen::MatrixXd result;
   for (std::size_t log = first_log; log < last_log; ++log) {
     Eigen::MatrixXd raw;
+    const Eigen::MatrixXd inertial =
+        inertial_columns(*effect.effect, series[log], {channel.kind, channel.index}, effect.at);
     if (!effect.effect->columns(series[log], {channel.kind, channel.index, about}, effect.at, shape,
-                                raw))
-      continue;
+                                raw)) {
+      if (inertial.size() == 0) continue;
+      raw.setZero(inertial.rows(), inertial.cols());  // a mass that turns about a vertical axis
+    }
     if (where != ActingLogs::kAll) subtract_shared(log, effect, shape, channel, raw);
     if (chord) {
       raw = effect_series({effect.effect, effect.at, {about[0]}, {}, {}}, series[log], channel.kind,
@@ -110,8 +114,6 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
         }));
       }
     }
-    const Eigen::MatrixXd inertial =
-        inertial_columns(*effect.effect, series[log], {channel.kind, channel.index}, effect.at);
     if (inertial.size() > 0)
       raw += inertial.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
     if (result.size() == 0) result.setZero(channel.rows(), raw.cols());

@@ -112,6 +112,8 @@ struct Evidence {
   }
   /// Sum of what the effects of the model add. [samples, SI]
   Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
+  /// The same behind the channel's filter. What comes from filtered derivatives has passed it (Effect::columns_filtered).
+  Eigen::VectorXd smooth_known(std::size_t log, EvidenceKind kind, int index) const;
   /// A change of an effect that acts in all logs and has a parameter which switches it on (a lag's share) replaces the law of
   /// before: its signature is the difference of both.
   /// @param columns [samples x linear parameters] of the effect with its present shape, changed in place

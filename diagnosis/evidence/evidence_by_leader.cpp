@@ -26,6 +26,16 @@ VectorXd Evidence::known(std::size_t log, EvidenceKind kind, int index) const {
   return sum;
 }
 
+VectorXd Evidence::smooth_known(std::size_t log, EvidenceKind kind, int index) const {
+  const Index n = series[log].samples();
+  VectorXd to_filter = VectorXd::Zero(n), filtered = VectorXd::Zero(n);
+  for (const AppliedEffect& effect : known_in(log)) {
+    const VectorXd one = effect_series(effect, series[log], kind, index);
+    if (one.size() > 0) (effect.effect->columns_filtered() ? filtered : to_filter) += one;
+  }
+  return filter(log, kind, to_filter) + filtered;
+}
+
 MatrixXd Evidence::margins(std::size_t log, int pump) const {
   const auto at = static_cast<std::size_t>(pump);
   const std::vector<int>& feeds = series[log].machine->pumps[at].feeds;
@@ -59,11 +69,13 @@ std::optional<Evidence> Evidence::with_leaders_of(std::span<const AppliedEffect>
     for (std::size_t log = 0; log < series.size(); ++log) {
       const PumpSeries& before = series[log].pumps[p];
       if (before.demand.size() == 0 || before.pressure.size() == 0) continue;
-      const VectorXd less = before.demand - pumps[log][p].demand +
-                            known(log, channel.kind, channel.index) -
+      const VectorXd demand = before.demand - pumps[log][p].demand;
+      if (log < channel.raw.size() && channel.raw[log].size() > 0)
+        channel.raw[log] += demand + known(log, channel.kind, channel.index) -
                             out.known(log, channel.kind, channel.index);
-      if (log < channel.raw.size() && channel.raw[log].size() > 0) channel.raw[log] += less;
-      const VectorXd y = filter(log, channel.kind, less);
+      const VectorXd y = filter(log, channel.kind, demand) +
+                         smooth_known(log, channel.kind, channel.index) -
+                         out.smooth_known(log, channel.kind, channel.index);
       const MatrixXd base = out.margins(log, channel.index);
       for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
         if (channel.log[b] != static_cast<int>(log)) continue;

@@ -293,10 +293,10 @@ void EvidenceCollector::add_force_channel(int cylinder) {
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_force()) continue;
-    const VectorXd beyond = c.force - e.known(log, EvidenceKind::kForce, cylinder);
-    const VectorXd y = e.filter(log, EvidenceKind::kForce, beyond) - c.static_force;
+    const VectorXd y = e.filter(log, EvidenceKind::kForce, c.force) - c.static_force -
+                       e.smooth_known(log, EvidenceKind::kForce, cylinder);
     b.channel.raw.resize(signals_.size());
-    b.channel.raw[log] = beyond - c.static_force;
+    b.channel.raw[log] = c.force - c.static_force - e.known(log, EvidenceKind::kForce, cylinder);
     for (const double f : c.static_force) {
       if (std::isfinite(f))
         b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
@@ -324,8 +324,7 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
     MatrixXd base(c.command.size(), 2);
     base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
     base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
-    const VectorXd y =
-        c.speed - e.filter(log, EvidenceKind::kFlow, e.known(log, EvidenceKind::kFlow, cylinder));
+    const VectorXd y = c.speed - e.smooth_known(log, EvidenceKind::kFlow, cylinder);
     b.add(log, signals_[log]->usable && !signals_[log]->edge, y, base, 0);
     for (Index k = 0; k < y.size(); ++k) {
       if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
@@ -387,9 +386,8 @@ bool EvidenceCollector::add_chamber(std::size_t log, const ChamberRole& chamber,
   const CylinderSignals& c = signals_[log]->cylinders[at];
   if (!measures_both_chambers(c) || split.return_line.size() == 0) return false;
   const CylinderSeries& s = evidence_.series[log].cylinders[at];
-  VectorXd y = evidence_.filter(
-      log, chamber.kind(),
-      chamber.pressure(c) - evidence_.known(log, chamber.kind(), to.channel.index));
+  VectorXd y = evidence_.filter(log, chamber.kind(), chamber.pressure(c)) -
+               evidence_.smooth_known(log, chamber.kind(), to.channel.index);
   const MatrixXd base = chamber.baseline(s);
   if (support != nullptr) support->limit(base, y);
   to.add(log, chamber.returning ? split.return_line : split.counterbalance, y, base,
@@ -425,13 +423,14 @@ void EvidenceCollector::add_pump_channel(int pump) {
     const PumpSignals& s = signals_[log]->pumps[at];
     const PumpSeries& series = e.series[log].pumps[at];
     if (s.pressure.size() == 0 || series.demand.size() == 0) continue;
-    const VectorXd beyond = s.pressure - series.demand - e.known(log, EvidenceKind::kPump, pump);
-    const VectorXd y = e.filter(log, EvidenceKind::kPump, beyond);
+    const VectorXd beyond = s.pressure - series.demand;
+    const VectorXd y =
+        e.filter(log, EvidenceKind::kPump, beyond) - e.smooth_known(log, EvidenceKind::kPump, pump);
     const Mask follows = below_cut_off(model_.machine.pumps[at], *signals_[log], s.pressure_smooth);
     b.add(log, signals_[log]->usable && !signals_[log]->edge && follows, y, e.margins(log, pump),
           0);
     b.channel.raw.resize(signals_.size());
-    b.channel.raw[log] = beyond;
+    b.channel.raw[log] = beyond - e.known(log, EvidenceKind::kPump, pump);
     if (is_suspect(log)) noise.add(s.pressure, gain_pressure_[log]);
   }
   b.channel.noise_floor = noise.value();
@@ -458,7 +457,7 @@ void EvidenceCollector::add_return_line_channel() {
     base.col(1) = e.filter(log, kKind, total);
     base.col(2) = e.filter(log, kKind, total.cwiseAbs2());
     b.add(log, signals_[log]->usable && !signals_[log]->edge,
-          e.filter(log, kKind, raw - e.known(log, kKind, 0)), base, 0);
+          e.filter(log, kKind, raw) - e.smooth_known(log, kKind, 0), base, 0);
     if (is_suspect(log)) noise.add(raw, gain_pressure_[log]);
   }
   b.channel.noise_floor = noise.value();

@@ -96,6 +96,23 @@ TEST(Evidence, ForcesBeforeTheFilterAreBeyondTheModelsEffects) {
   EXPECT_GT(most, 5.0) << "[N] the carriage hardly accelerates, so that this shows nothing";
 }
 
+/// Beside inertial forces that the model has, a mass on a horizontal carriage shows in nothing but its own inertia.
+TEST(Evidence, AMassShowsByItsInertiaWhereTheModelHasOne) {
+  CraneModel model = CraneModel::untrained(carriage());
+  const MachineSignals signals = make_signals(model.machine, rippling_log(1.3, 50.0));
+  const EffectAt mass = parse_effect("unmodelled_mass:axis", model.machine);
+  const Evidence quasi_static = collect_evidence(model, {signals});
+  EXPECT_EQ(quasi_static.columns(mass, {}, *quasi_static.find(EvidenceKind::kForce, 0)).size(), 0);
+  model.effects = {{find_effect("inertia"), -1, {1.0}, {}, {}}};
+  const Evidence e = collect_evidence(model, {signals});
+  const EvidenceChannel& force = *e.find(EvidenceKind::kForce, 0);
+  const MatrixXd columns = e.columns(mass, {}, force);
+  ASSERT_GT(columns.size(), 0);
+  const VectorXd one_kg = columns.col(0);
+  // the same filtered acceleration on both sides
+  EXPECT_NEAR(one_kg.dot(force.y) / one_kg.squaredNorm(), 0.3 * kMass, 0.01 * kMass);
+}
+
 class MatchedFilters : public testing::TestWithParam<std::pair<double, double>> {};
 
 /// A diagnosis is kept longer than the model it was made with, by pages and by the record of an improvement.
