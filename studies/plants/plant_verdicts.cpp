@@ -43,7 +43,7 @@ struct Arguments {
   bool no_reference = false, without_settling = false, without_support = false, verbose = false;
 };
 
-/// Change of a channel over its sensor's noise below which a change is counted as one that no log of this length shows.
+/// Change of a channel over its sensor's noise from which a change counts as one above a sensor's noise. Many rows show smaller ones.
 /// @threshold [1] 0.1..10; chosen: in one stretch of 4 s at least, the change is as large as what the sensor scatters
 constexpr double kVisible = 1.0;
 
