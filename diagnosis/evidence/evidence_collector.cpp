@@ -9,6 +9,7 @@
 #include "diagnosis/evidence/channel_builder.h"
 #include "diagnosis/evidence/common_support.h"
 #include "diagnosis/evidence/evidence.h"
+#include "diagnosis/evidence/filled_chambers.h"
 #include "identification/learning/learn_pump.h"
 #include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/low_pass.h"
@@ -325,7 +326,11 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
     base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
     base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
     const VectorXd y = c.speed - e.smooth_known(log, EvidenceKind::kFlow, cylinder);
-    b.add(log, signals_[log]->usable && !signals_[log]->edge, y, base, 0);
+    const MachineSignals& signals = *signals_[log];
+    Mask rows = signals.usable && !signals.edge;
+    const Mask filled = chambers_filled(signals, c, options().void_pressure);
+    if (options().mechanisms.act(Mechanism::kVoid, !filled.all())) rows = rows && filled;
+    b.add(log, rows, y, base, 0);
     for (Index k = 0; k < y.size(); ++k) {
       if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
     }

@@ -136,6 +136,10 @@ struct EvidenceOptions {
   /// @threshold [Pa/s] 1e5..1e8; chosen: a load that is driven through its range in two seconds changes its pressure as fast; a pump
   /// that follows a demand is ten times faster
   double fastest_settled = 5e6;
+  /// Pressure below which a chamber that grows counts as void, so that the valve's flow does not set the speed there.
+  /// @threshold [Pa] 0..1e6; chosen: an anti-cavitation valve holds tank pressure less its cracking pressure, some 1 bar, and a
+  /// sensor's offset and noise add another
+  double void_pressure = 2e5;
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows
   /// would cost time and add no information

@@ -32,6 +32,7 @@ enum class Mechanism : unsigned {
   kEvent,            ///< event in the residual of a force or speed
   kSettling,         ///< noise that is larger while the machine settles after a change of a command
   kCommonSupport,    ///< pressures are compared where the references have flows and forces
+  kVoid,             ///< speeds are compared where the chamber that grows carries pressure
   kCount
 };
 

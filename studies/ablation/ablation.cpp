@@ -53,7 +53,8 @@ const Named kMechanisms[] = {{"leaders", Mechanism::kLeaders},
                              {"once", Mechanism::kOnce},
                              {"event", Mechanism::kEvent},
                              {"settling", Mechanism::kSettling},
-                             {"common_support", Mechanism::kCommonSupport}};
+                             {"common_support", Mechanism::kCommonSupport},
+                             {"void", Mechanism::kVoid}};
 
 struct Options {
   int runs = 100;
