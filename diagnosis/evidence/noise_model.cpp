@@ -134,7 +134,9 @@ NoiseModel estimate_evenly(const Eigen::Ref<const Eigen::VectorXd>& residual,
       m.variance = n0 > 0.0 ? std::max(c0 / n0, 1e-300) : 1.0;
       return m;
     }
-    const double g0 = c0 / n0, g1 = n1 > 0 ? c1 / n1 : 0.0, g2 = n2 > 0 ? c2 / n2 : 0.0;
+    const double coloured = 1.0 - options.white_share;
+    const double g0 = c0 / n0, g1 = n1 > 0 ? coloured * c1 / n1 : 0.0,
+                 g2 = n2 > 0 ? coloured * c2 / n2 : 0.0;
     const double k1 = std::clamp(g1 / g0, -largest, largest);
     const double e1 = g0 * (1.0 - k1 * k1);
     const double k2 = std::clamp((g2 - k1 * g1) / e1, -largest, largest);

@@ -103,7 +103,8 @@ EffectAction effect_action(const Evidence& evidence,
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
     for (const EvidenceChannel::SharedAction& s : channel.shared) {
-      const VectorXd wrong = form_share(*s.effect, options) / noise * s.values;
+      const double share = options.shared_form_share * form_share(*s.effect, options);
+      const VectorXd wrong = share / noise * s.values;
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
   }

@@ -34,13 +34,20 @@ const std::vector<NoiseModel>& laws() {
   return all;
 }
 
+/// All of the series may be coloured.
+NoiseOptions as_drawn() {
+  NoiseOptions options;
+  options.white_share = 0.0;
+  return options;
+}
+
 TEST(NoiseModel, EstimatesWhatItWasDrawnFrom) {
   std::mt19937_64 random(1);
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(60, 250));
   for (const NoiseModel& truth : laws()) {
     VectorXd offsets;
     const VectorXd y = draw(truth, blocks, random, &offsets);
-    const NoiseModel m = NoiseModel::estimate(y, blocks);
+    const NoiseModel m = NoiseModel::estimate(y, blocks, true, as_drawn());
     // 15 000 rows: the coefficients' standard deviation is at most 1/sqrt(15000) = 0.008; subtracting the blocks' means
     // adds a bias of a few / 250 rows of a block
     EXPECT_NEAR(m.phi1, truth.phi1, 0.05) << truth.phi1 << " " << truth.phi2;
@@ -101,7 +108,7 @@ TEST(NoiseModel, WhitenedRowsAreWhiteAndOfUnitSize) {
   const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(40, 200));
   for (const NoiseModel& truth : laws()) {
     MatrixXd y = draw(truth, blocks, random);
-    const NoiseModel m = NoiseModel::estimate(y.col(0), blocks);
+    const NoiseModel m = NoiseModel::estimate(y.col(0), blocks, true, as_drawn());
     m.whiten(blocks, y);
     y /= std::sqrt(m.variance);
     // The variance is estimated from the same rows, so that the offsets' shrinkage alone makes a difference.
@@ -218,7 +225,7 @@ TEST(NoiseModel, FewBlocksHaveNoOffsetsAndNothingIsNoError) {
 
 TEST(NoiseModel, OptionsLimitReflectionsAndOffsets) {
   std::mt19937_64 random(4);
-  NoiseOptions options;
+  NoiseOptions options = as_drawn();
   options.largest_reflection = 0.5;
   options.fewest_blocks_for_offsets = 6;
   const std::vector<NoiseBlock> eight = blocks_of(std::vector<Index>(8, 60));
@@ -228,6 +235,48 @@ TEST(NoiseModel, OptionsLimitReflectionsAndOffsets) {
   const std::vector<NoiseBlock> five = blocks_of({50, 50, 50, 50, 50});
   const VectorXd y = draw(laws()[2], five, random);
   EXPECT_EQ(NoiseModel::estimate(y, five, true, options).offset_variance, 0.0);
+}
+
+TEST(NoiseModel, AShareOfTheVarianceIsWhiteAndTheDeviationThatOfTheSeries) {
+  std::mt19937_64 random(7);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(60, 250));
+  NoiseOptions options;
+  for (const NoiseModel& law : laws()) {
+    const VectorXd y = draw(law, blocks, random);
+    const NoiseModel all = NoiseModel::estimate(y, blocks, false, as_drawn()),
+                     m = NoiseModel::estimate(y, blocks, false, options);
+    // Levinson's first step gives the correlation of neighbours back; shares of it are exact
+    const auto neighbours = [](const NoiseModel& n) { return n.phi1 / (1.0 - n.phi2); };
+    EXPECT_NEAR(neighbours(m), (1.0 - options.white_share) * neighbours(all), 1e-12);
+    EXPECT_NEAR(m.deviation(), all.deviation(), 1e-9 * all.deviation());
+  }
+}
+
+/// A law is driven by a signal that is measured with noise, and slow errors of the model lie beside it: differences of neighbouring
+/// rows, which alone count by the exact inverse covariance of slow errors, are mostly that noise.
+TEST(NoiseModel, NoiseOfARegressorDoesNotDecideTheSizeOfItsLaw) {
+  std::mt19937_64 random(8);
+  const std::vector<NoiseBlock> blocks = blocks_of(std::vector<Index>(50, 100));
+  const Index n = testing_support::rows_of(blocks);
+  const NoiseModel slow = model_of(1.9, -0.92, 1.0, 0.0);
+  const VectorXd signal = draw(slow, blocks, random), errors = draw(slow, blocks, random);
+  const VectorXd y = 2.0 * signal + errors;
+  const VectorXd measured = signal + 0.03 * signal.norm() / std::sqrt(static_cast<double>(n)) *
+                                         testing_support::white(n, random);
+  const auto size = [&](const NoiseOptions& options) {
+    double by = measured.dot(y) / measured.squaredNorm();
+    for (int pass = 0; pass < 3; ++pass) {
+      const NoiseModel m = NoiseModel::estimate(y - by * measured, blocks, false, options);
+      MatrixXd rows(n, 2);
+      rows << measured, y;
+      m.whiten(blocks, rows);
+      by = rows.col(0).dot(rows.col(1)) / rows.col(0).squaredNorm();
+    }
+    return by;
+  };
+  EXPECT_LT(size(as_drawn()), 1.2) << "the noise decides nothing: this test shows nothing";
+  // 4 % of attenuation, and 2 % of sampling beside as large errors in 50 blocks
+  EXPECT_NEAR(size({}), 2.0, 0.15);
 }
 
 TEST(NoiseModel, ARampStaysStationary) {

@@ -117,6 +117,19 @@ TEST(EffectAction, SizeIsComparedWithTheModelFormErrorOfOthers) {
   EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
 }
 
+TEST(EffectAction, HalfOfTheFormErrorOfALawThatBothLogsHaveIsTheSameInBoth) {
+  const VectorXd ones = VectorXd::Ones(kRows);
+  Evidence e = evidence_with(110.0 * ones, 1.0, 6);
+  const EffectDesign small = plain_design({ones});
+  EffectFit fit = fit_effects(e, {&small});
+  fit.theta << 10.0;
+  e.channels[0].shared = {{find_effect("flow_saturation"), 100.0 * ones}};
+  EXPECT_NEAR(effect_action(e, {&small}, 0, fit).over_form, 2.0, 1e-9);
+  RegressionOptions whole;
+  whole.shared_form_share = 1.0;
+  EXPECT_NEAR(effect_action(e, {&small}, 0, fit, whole).over_form, 1.0, 1e-9);
+}
+
 TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
   VectorXd v(kRows);
   for (Index k = 0; k < kRows; ++k) v[k] = 0.02 * static_cast<double>(k % 50 - 25);  // m/s
