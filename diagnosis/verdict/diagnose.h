@@ -190,6 +190,9 @@ struct Diagnosis {
   std::string headline() const;                          ///< one sentence
   /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
   std::string p_value_text() const;
+  /// Why nothing is named, in a sentence: there is only noise, or what is more than noise is no difference, or no effect passes the
+  /// tests. For the verdict none.
+  std::string none_text() const;
   /// One screen for a terminal. @param first_line in place of the headline; empty = the headline
   std::string table(const std::string& first_line = "") const;
   std::string json() const;  ///< keys of the contract and more

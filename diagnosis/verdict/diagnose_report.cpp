@@ -181,7 +181,9 @@ std::string Diagnosis::table(const std::string& first_line) const {
       out += fmt::format("      {:32s} {:8.1f}\n", ranking[i].first, ranking[i].second);
     }
   }
-  if (verdict != Verdict::kUnknown || !evidence.channels.empty())
+  if (verdict == Verdict::kNone)
+    out += fmt::format("\n  {}\n", none_text());
+  else if (verdict != Verdict::kUnknown || !evidence.channels.empty())
     out += fmt::format("\n  Probability of this evidence if nothing were missing: {}\n",
                        p_value_text());
   for (const std::string& note : notes) out += fmt::format("  note: {}\n", note);
@@ -192,6 +194,15 @@ std::string Diagnosis::p_value_text() const {
   // The smallest value that so many simulations can give bounds the true one from above.
   const bool at_resolution = p_value * (search.simulations + 1.0) < 1.5;
   return fmt::format("{}{:.2g}", at_resolution ? "below " : "", p_value);
+}
+
+std::string Diagnosis::none_text() const {
+  if (p_value >= SearchOptions().false_alarm)
+    return fmt::format("The residuals contain no more than noise would (p = {}).", p_value_text());
+  return fmt::format("The residuals contain more than noise would (p = {}), but {}.",
+                     p_value_text(),
+                     evidence.has_reference() ? "the references show it as well"
+                                              : "no effect passes the acceptance tests");
 }
 
 std::string Diagnosis::json() const {

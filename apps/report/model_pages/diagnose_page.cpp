@@ -9,7 +9,6 @@
 #include "apps/report/model_pages/diagnose_charts.h"
 #include "apps/report/model_pages/effect_text.h"
 #include "apps/report/model_pages/improve_page.h"
-#include "diagnosis/selection/effect_search.h"
 #include "models/files/model_file.h"
 #include "models/math/nan.h"
 
@@ -63,17 +62,6 @@ std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
   return text;
 }
 
-/// Why nothing is named: there is only noise, or what is more than noise is no difference, or no effect that passes the tests.
-std::string none_text(const Diagnosis& d) {
-  if (d.p_value >= SearchOptions().false_alarm)
-    return fmt::format("The residuals contain no more than noise would (p = {}). ",
-                       d.p_value_text());
-  return fmt::format("The residuals contain more than noise would (p = {}), but {}. ",
-                     d.p_value_text(),
-                     d.evidence.has_reference() ? "the references show it as well"
-                                                : "no effect passes the acceptance tests");
-}
-
 void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
                  const ExtendResult* tested) {
   std::string text;
@@ -96,7 +84,7 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
         "Do not add anything to the model before the cause is known; the signals on which the "
         "residual depends are shown below.";
   if (d.verdict == Verdict::kNone) {
-    text += none_text(d);
+    text += d.none_text() + " ";
   } else if (d.verdict == Verdict::kMissing) {
     text += fmt::format("Chance of such evidence if no effect were missing: {}.", d.p_value_text());
   }
