@@ -198,11 +198,14 @@ std::string Diagnosis::p_value_text() const {
 
 std::string Diagnosis::none_text() const {
   if (p_value >= SearchOptions().false_alarm)
-    return fmt::format("The residuals contain no more than noise would (p = {}).", p_value_text());
-  return fmt::format("The residuals contain more than noise would (p = {}), but {}.",
-                     p_value_text(),
-                     evidence.has_reference() ? "the references show it as well"
-                                              : "no effect passes the acceptance tests");
+    return fmt::format(
+        "The residuals contain no more than noise would (probability by chance: {}).",
+        p_value_text());
+  return fmt::format(
+      "The residuals contain more than noise would (probability by chance: {}), but {}.",
+      p_value_text(),
+      evidence.has_reference() ? "the references show it as well"
+                               : "no effect passes the acceptance tests");
 }
 
 std::string Diagnosis::json() const {

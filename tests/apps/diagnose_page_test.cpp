@@ -143,10 +143,12 @@ TEST(DiagnosePage, HasAHeadlineForEveryVerdict) {
   d.verdict = Verdict::kNone;
   d.p_value = 0.4;
   d.search.simulations = 300;  // by so few the smallest p-value would be told as a bound
-  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("no more than noise would (p = 0.4)"));
-  d.p_value = 0.02;
   EXPECT_THAT(diagnose_page(model, d).html(),
-              HasSubstr("contain more than noise would (p = 0.02), but no effect"));
+              HasSubstr("no more than noise would (probability by chance: 0.4)"));
+  d.p_value = 0.02;
+  EXPECT_THAT(
+      diagnose_page(model, d).html(),
+      HasSubstr("contain more than noise would (probability by chance: 0.02), but no effect"));
   d.verdict = Verdict::kUnknown;
   d.unexplained =
       Unexplained{"force", "arm", {"arm angle"}, 0.8,

@@ -153,7 +153,7 @@ TEST(NullDistribution, AnAcceptedEffectCannotBeFoundAgain) {
 }
 
 TEST(NullDistribution, MoreCandidatesRaiseTheThreshold) {
-  const Null null(4);
+  const Null null(7);
   const EffectFit fit = fit_effects(null.evidence, {});
   std::vector<NullCandidate> one = {{&null.catalogue[0], null.penalty}};
   std::mt19937_64 a(1), b(1);
@@ -162,6 +162,7 @@ TEST(NullDistribution, MoreCandidatesRaiseTheThreshold) {
                          wide = simulate_null_distribution({null.evidence, fit}, null.candidates(),
                                                            kSimulations, b);
   EXPECT_GT(wide.threshold(0.05), narrow.threshold(0.05));
+  ASSERT_EQ(narrow.scale.front(), 1.0) << "gains are scaled, so that penalties do not add up";
   // a penalty lowers a candidate's gains by as much
   one[0].penalty += 3.0;
   std::mt19937_64 c(1);

@@ -65,7 +65,7 @@ TEST(SearchMoves, TheVariantThatExplainsMoreTakesThePlace) {
 }
 
 TEST(SearchMoves, AVariantOnTheBoundOfItsRangeDoesNotTakeThePlace) {
-  const Hunting pump(3.0, -1.5);
+  const Hunting pump(3.0, -2.5);
   EXPECT_LT(pump.share_of(0.0), 1.9);
   EXPECT_EQ(pump.share_of(3.0), 2.0);
   EXPECT_NE(pump.form_after(), 3.0);

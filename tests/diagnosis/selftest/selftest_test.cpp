@@ -81,7 +81,10 @@ TEST(DrawNoise, HasTheModelsAutoregressionAndOffsets) {
   std::vector<NoiseBlock> blocks;
   for (Eigen::Index b = 0; b < 400; ++b) blocks.push_back({100 * b, 100 * (b + 1)});
   std::mt19937_64 random(3);
-  const NoiseModel found = NoiseModel::estimate(draw_noise(noise, blocks, 40000, random), blocks);
+  NoiseOptions options;
+  options.white_share = 0.0;
+  const NoiseModel found =
+      NoiseModel::estimate(draw_noise(noise, blocks, 40000, random), blocks, true, options);
   // 40 000 rows: standard errors 0.005 of phi, 0.03 of the variance; 400 offsets: 0.2
   EXPECT_NEAR(found.phi1, noise.phi1, 0.03);
   EXPECT_NEAR(found.phi2, noise.phi2, 0.03);
