@@ -224,11 +224,14 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
     unmodelled.push_back(l);
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
-    Unexplained unnamed = describe_unnamed(d);
-    if (exceeds_references(d, unnamed.channel))
+    // what both logs lack may gain most, and another one in another channel be the change
+    for (const FoundEffect& f : d.search.unnamed) {
+      Unexplained unnamed = describe_unnamed(d, f);
+      if (!exceeds_references(d, unnamed.channel)) continue;
       d.unexplained = std::move(unnamed);
-    else
-      d.shared_structure.push_back(std::move(unnamed));
+      break;
+    }
+    if (!d.unexplained) d.shared_structure.push_back(describe_unnamed(d, d.search.unnamed.front()));
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once) {
     Unexplained event = describe_isolated_event(d, options.isolated_event);

@@ -147,8 +147,7 @@ Unexplained describe_residual_structure(const Evidence& evidence, const Residual
   return u;
 }
 
-Unexplained describe_unnamed(const Diagnosis& d) {
-  const FoundEffect& f = d.search.unnamed.front();
+Unexplained describe_unnamed(const Diagnosis& d, const FoundEffect& f) {
   const std::string key =
       effect_key(f.design.effect.effect->info(), *d.evidence.series[0].machine, f.design.effect.at);
   Unexplained u;

@@ -33,8 +33,8 @@ Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffec
 /// Describes unmodelled structure that a residual model found.
 Unexplained describe_residual_structure(const Evidence& evidence, const ResidualStructure& left);
 
-/// Describes evidence that fits an effect only with implausible parameters.
-Unexplained describe_unnamed(const Diagnosis& d);
+/// Describes evidence that fits an effect only with implausible parameters. @param f one of SearchResult::unnamed
+Unexplained describe_unnamed(const Diagnosis& d, const FoundEffect& f);
 
 /// Describes a channel whose residual is larger than in the references although no effect and no signal explains it.
 Unexplained describe_beyond_references(const Diagnosis& d, std::size_t channel);
