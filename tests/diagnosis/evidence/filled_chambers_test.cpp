@@ -80,7 +80,8 @@ TEST(FilledChambers, WithoutBothPressuresNothingIsKnownOfAVoid) {
 TEST(FilledChambers, AVoidDoesNotChangeTheGainThatIsLearned) {
   const Machine machine = testing_support::drawn_machine("loader_crane");
   const CraneModel model = CraneModel::untrained(machine);
-  MachineSignals log = make_signals(machine, hidden_case(machine, {}, {5, 60.0}).train);
+  MachineSignals log =
+      make_signals(machine, testing_support::hidden_case(machine, {}, {5, 60.0}).train);
   CylinderSignals& rod = log.cylinders[0];
   const auto gain = [&](bool leaves_out) {
     EvidenceOptions options;

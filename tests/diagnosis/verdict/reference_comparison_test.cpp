@@ -44,6 +44,7 @@ Log crane_log(const std::vector<HiddenEffect>& effects, std::uint64_t motions) {
 
 std::vector<std::string> keys_of(const std::vector<DiagnosedEffect>& effects) {
   std::vector<std::string> keys;
+  keys.reserve(effects.size());
   for (const DiagnosedEffect& e : effects) keys.push_back(e.key());
   return keys;
 }
