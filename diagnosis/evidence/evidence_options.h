@@ -75,7 +75,7 @@ struct NoiseOptions {
   /// ITU-T G.728). Laws are driven by measured pressures, whose errors would else decide the sizes of laws beside slow model errors:
   /// the inverse covariance of these weights differences of neighbouring rows a thousand times more than levels.
   /// @threshold [1] 0..1; tuned: sizes of laws in the speeds of a simulated excavator and a crane differ from those of ordinary least
-  /// squares by up to a quarter, in place of three quarters; from 0.1 to 0.3 they change by less than a tenth
+  /// squares by up to a quarter, in place of three quarters; from 0.1 to 0.3 they change by up to an eighth
   double white_share = 0.2;
   /// Blocks below which they have no random offset.
   /// @threshold [blocks] 2..; chosen: a variance of fewer block means says nothing

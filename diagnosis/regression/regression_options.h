@@ -11,8 +11,8 @@ struct RegressionOptions {
   double least_form_error = 0.1;
   /// Share of the model-form error of a law that suspect and reference logs both have which is another one in the suspect logs: what
   /// is the same in both is estimated from both and makes no difference.
-  /// @threshold [1] 0..1; tuned: at 1 a dead band that is twice that of the references stays unsaid (plant 545); no clean log of plants
-  /// 521 to 566 changes its answer
+  /// @threshold [1] 0..1; tuned: at 1 a dead band that is twice that of the references stays unsaid (plant 545); the clean logs
+  /// of plants 521, 523, 545, 562, 563 and 581 to 585 have no difference with it
   double shared_form_share = 0.5;
   /// Bound of the relative change of an effect's exponent (see other_power).
   /// @threshold [1] 0..1; derived: covers the published exponents, v^0.85 instead of v for friction
