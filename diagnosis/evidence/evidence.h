@@ -42,7 +42,7 @@ struct EvidenceChannel {
   double largest_force = 0.0;  ///< [N] largest static force; force channels only
   /// What the effects add that act in suspect and reference logs alike (EvidenceOptions::shared).
   struct SharedAction {
-    const Effect* effect = nullptr;
+    EffectAt effect;
     Eigen::VectorXd values;  ///< [rows, SI]
   };
   std::vector<SharedAction> shared;
@@ -92,10 +92,10 @@ struct Evidence {
                           ActingLogs where = ActingLogs::kSuspects) const;
 
   /// The same evidence with the load-sensing leaders that follow from the model's effects and, in suspect logs, from
-  /// `found`. A line loss can make another cylinder the leader, which signatures built with the former leaders do not
-  /// contain. Rows stay the same.
+  /// `found`, and with the lag of the pump that these have. A line loss can make another cylinder the leader, which signatures built
+  /// with the former leaders do not contain. Rows stay the same.
   /// @param found effects with the values near which the signatures are to hold
-  /// @return nothing when the leaders do not change
+  /// @return nothing when neither leaders nor lags change
   std::optional<Evidence> with_leaders_of(std::span<const AppliedEffect> found) const;
 
  private:

@@ -235,6 +235,10 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
     e.series.push_back(make_series(model_, s));
     if (!is_suspect(log) && in_references != nullptr)
       e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
+    for (PumpSeries& p : e.series[log].pumps) {
+      const bool late = p.following.effect != nullptr;
+      if (late && !e.options.mechanisms.act(Mechanism::kPumpFollows)) p.following = {};
+    }
     if (e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling)) {
       VectorXd since = since_change(e.series[log], e.options.least_change);
       restart_where_pumps_move(s, e.series[log], e.options.fastest_settled, since);

@@ -33,6 +33,7 @@ enum class Mechanism : unsigned {
   kSettling,         ///< noise that is larger while the machine settles after a change of a command
   kCommonSupport,    ///< pressures are compared where the references have flows and forces
   kVoid,             ///< speeds are compared where the chamber that grows carries pressure
+  kPumpFollows,      ///< changes of the demand show in the pump's pressure by the lag that it has
   kCount
 };
 

@@ -40,6 +40,17 @@ double size_where_it_acts(const VectorXd& action) {
   return std::sqrt(action.array().pow(4).sum() / action.squaredNorm());
 }
 
+/// Squares of an action that the same effect in all logs leaves: what that takes of a difference between logs, no learned law has.
+double beyond_own_law(const EvidenceChannel& channel, const EffectAt& effect,
+                      const VectorXd& action) {
+  for (const EvidenceChannel::SharedAction& s : channel.shared) {
+    const double squares = s.values.squaredNorm();
+    if (s.effect == effect && squares > 0.0)
+      return action.squaredNorm() - std::pow(s.values.dot(action), 2) / squares;
+  }
+  return action.squaredNorm();
+}
+
 }  // namespace
 
 double form_share(const Effect& effect, const RegressionOptions& options) {
@@ -84,7 +95,7 @@ EffectAction effect_action(const Evidence& evidence,
     const EvidenceChannel& channel = evidence.channels[c];
     const double noise = fit.noise[c].deviation();
     VectorXd own = acts_in(index, c);
-    const double here = own.squaredNorm();
+    const double here = beyond_own_law(channel, designs[index]->effect, own);
     whole += here / (noise * noise);
     if (channel.baseline.cols() > 0) own -= channel.baseline * least_squares(channel.baseline, own);
     const double squares = own.squaredNorm();
@@ -103,7 +114,7 @@ EffectAction effect_action(const Evidence& evidence,
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }
     for (const EvidenceChannel::SharedAction& s : channel.shared) {
-      const double share = options.shared_form_share * form_share(*s.effect, options);
+      const double share = options.shared_form_share * form_share(*s.effect.effect, options);
       const VectorXd wrong = share / noise * s.values;
       form += (wrong.cwiseProduct(own) / noise).squaredNorm();
     }

@@ -12,6 +12,7 @@
 #include "diagnosis/selection/leader_updates.h"
 #include "diagnosis/selection/search_candidates.h"
 #include "identification/comparison/report_numbers.h"
+#include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/series.h"
 #include "models/math/error.h"
 #include "models/math/golden_section.h"
@@ -139,9 +140,13 @@ class Estimator {
     EvidenceOptions how = options_.evidence;
     how.whole_motions = how.whole_motions || sharp_;
     Evidence evidence = collect_evidence(model, suspects_, references_, &in_references_, how);
-    // a lag keeps the valve openings of the dead band known before, also while both are estimated
-    for (MachineSeries& s : evidence.series)
+    // laws keep what those known before leave them, also while all are estimated: a valve's lag the openings that a dead band
+    // leaves, a line's loss the pump's lag
+    for (MachineSeries& s : evidence.series) {
       s = with_passed_flows(known_, with_openings(known_, std::move(s)));
+      if (options_.evidence.mechanisms.enabled(Mechanism::kPumpFollows))
+        s.pumps = pumps_with_lags_of(known_, s);
+    }
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without_rows(c, leave_out_);
     return evidence;

@@ -15,6 +15,13 @@ bool adds_demand(const Evidence& evidence, std::span<const AppliedEffect> effect
       [&](const MachineSeries& s) { return asked_by_effects(effects, s).rows() > 0; });
 }
 
+/// Whether a pump's pressure follows its demand by this effect.
+bool is_pump_lag(const Evidence& evidence, const AppliedEffect& effect) {
+  const std::vector<PumpSeries> pumps = pumps_with_lags_of({&effect, 1}, evidence.series[0]);
+  return std::any_of(pumps.begin(), pumps.end(),
+                     [](const PumpSeries& p) { return p.following.effect != nullptr; });
+}
+
 }  // namespace
 
 bool adds_demand(const Evidence& evidence, const std::vector<FoundEffect>& found) {
@@ -58,7 +65,8 @@ std::optional<Evidence> with_leaders_of_found(const SearchState& search,
   for (const FoundEffect& f : found) designs.push_back(f.design);
   std::vector<AppliedEffect> acting = applied_effects(designs, fit.theta);
   const Evidence& given = search.evidence;
-  if (!adds_demand(given, std::span<const AppliedEffect>(&acting.back(), 1))) return {};
+  const std::span<const AppliedEffect> last(&acting.back(), 1);
+  if (!adds_demand(given, last) && !is_pump_lag(given, acting.back())) return {};
   std::optional<Evidence> updated;
   double total = fit.total();
   for (int turn = 0; turn < kLeaderTurns; ++turn) {

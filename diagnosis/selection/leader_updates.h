@@ -1,5 +1,5 @@
 #pragma once
-/// Updates of the evidence where an effect changes the load-sensing leader. Used by the search and its parts only.
+/// Updates of the evidence where an effect changes the load-sensing leader or the pump's lag. Used by the search and its parts only.
 #include <optional>
 #include <vector>
 
@@ -10,8 +10,8 @@ namespace sparflow {
 /// Updates of leaders and values in turn. A third of the error remains each time where half of the rows change.
 inline constexpr int kLeaderTurns = 5;
 
-/// Evidence with the load-sensing leaders that follow from the found effects, iterated with their values. Made only
-/// when the last effect adds to a cylinder's demand and the log-likelihood rises by SearchOptions::least_gain or more.
+/// Evidence with the load-sensing leaders and the pumps' lags that follow from the found effects, iterated with their values. Made
+/// only when the last effect adds to a cylinder's demand or is such a lag, and the log-likelihood rises by SearchOptions::least_gain or more.
 /// @param fit of all found  @return nothing when the leaders stay
 std::optional<Evidence> with_leaders_of_found(const SearchState& search,
                                               const std::vector<FoundEffect>& found,

@@ -55,10 +55,24 @@ MatrixXd asked_by_effects(std::span<const AppliedEffect> effects, const MachineS
 
 std::vector<PumpSeries> pumps_led_by(std::span<const AppliedEffect> effects,
                                      const MachineSeries& log) {
-  std::vector<PumpSeries> pumps = log.pumps;
+  std::vector<PumpSeries> pumps = pumps_with_lags_of(effects, log);
   const MatrixXd extra = asked_by_effects(effects, log);
   for (PumpSeries& p : pumps) {
     if (p.demand.size() > 0) find_leader(extra, p);
+  }
+  return pumps;
+}
+
+std::vector<PumpSeries> pumps_with_lags_of(std::span<const AppliedEffect> effects,
+                                           const MachineSeries& log) {
+  std::vector<PumpSeries> pumps = log.pumps;
+  const Eigen::VectorXd unchanged = Eigen::VectorXd::Zero(log.samples());
+  for (std::size_t p = 0; p < pumps.size(); ++p) {
+    pumps[p].following = {};
+    for (const AppliedEffect& e : effects) {
+      if (e.effect->followed_demand(log, static_cast<int>(p), e.at, e.values, unchanged).size() > 0)
+        pumps[p].following = {e.effect, e.at, e.values};
+    }
   }
   return pumps;
 }

@@ -14,8 +14,12 @@ Eigen::MatrixXd asked_by_effects(std::span<const AppliedEffect> effects, const M
 
 /// Recomputes the log's pumps for these effects: `leader` has the highest demand with the effects' contributions, `demand`
 /// is that cylinder's demand without them. The demand and the effects' columns then add up to the exact law at these
-/// parameter values.
+/// parameter values. `following` is set as below.
 std::vector<PumpSeries> pumps_led_by(std::span<const AppliedEffect> effects,
                                      const MachineSeries& log);
+
+/// The log's pumps with the lag (PumpSeries::following) that these effects have; leaders stay.
+std::vector<PumpSeries> pumps_with_lags_of(std::span<const AppliedEffect> effects,
+                                           const MachineSeries& log);
 
 }  // namespace sparflow

@@ -6,6 +6,7 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "models/effects/hydraulics.h"
 #include "models/effects/instant.h"
 #include "models/machine/inertial_torque.h"
 #include "models/machine/static_force.h"
@@ -144,6 +145,8 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
                                                                      : log.machine->pump_count());
   std::vector<double> out(count), demand(static_cast<std::size_t>(log.machine->cylinder_count()));
   bool any = false;
+  Eigen::MatrixXd asked;  // through the demand, which the pump may follow late
+  if (measured.kind == EvidenceKind::kPump) asked.setZero(n, linear);
   const auto set_row = [&](Eigen::Index i) {
     fill_instant(log, i, instant);
     for (Eigen::Index k = 0; k < linear; ++k) {
@@ -156,8 +159,8 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
         add_pump(instant, at, p, out);
         add_demand(instant, at, p, demand);
         const int leader = instant.leader[static_cast<std::size_t>(measured.index)];
-        if (leader >= 0)
-          out[static_cast<std::size_t>(measured.index)] += demand[static_cast<std::size_t>(leader)];
+        if (leader >= 0) asked(i, k) = demand[static_cast<std::size_t>(leader)];
+        any = any || asked(i, k) != 0.0;
       }
       p[static_cast<std::size_t>(k)] = 0.0;
       columns(i, k) = out[static_cast<std::size_t>(measured.index)];
@@ -172,6 +175,10 @@ bool Effect::columns(const MachineSeries& log, const MeasuredQuantity& measured,
       columns.row(i).setConstant(std::numeric_limits<double>::quiet_NaN());
       std::fill(p.begin(), p.begin() + linear, 0.0);
     }
+  }
+  for (Eigen::Index k = 0; k < asked.cols(); ++k) {
+    const double size = info().parameters[static_cast<std::size_t>(k)].typical;
+    columns.col(k) += reaching_pump(log, measured.index, size * asked.col(k)) / size;
   }
   return any;
 }

@@ -161,6 +161,13 @@ class Effect {
     return {};
   }
 
+  /// What a pump's pressure shows of a change of its demand [samples, Pa], which it follows late; empty: no such law.
+  virtual Eigen::VectorXd followed_demand(const MachineSeries& /*log*/, int /*pump*/, int /*at*/,
+                                          std::span<const double> /*p*/,
+                                          const Eigen::VectorXd& /*change*/) const {
+    return {};
+  }
+
   /// Whether a variant of the law is only told against a reference log: a part of the model that is learned from the same log may
   /// have the same signature.
   /// The argument has the nonlinear parameters [SI].

@@ -1,5 +1,7 @@
 #include "models/effects/hydraulics.h"
 
+#include "models/effects/effect.h"
+
 namespace sparflow {
 
 std::vector<int> hydraulic_cylinders(const Machine& machine) {
@@ -46,6 +48,12 @@ Eigen::VectorXd pump_flow(const MachineSeries& log, int pump) {
     sum += log.cylinders[static_cast<std::size_t>(i)].flow;
   }
   return sum;
+}
+
+Eigen::VectorXd reaching_pump(const MachineSeries& log, int pump, const Eigen::VectorXd& change) {
+  const LawOfModel& law = log.pumps[static_cast<std::size_t>(pump)].following;
+  if (law.effect == nullptr) return change;
+  return law.effect->followed_demand(log, pump, law.at, law.values, change);
 }
 
 const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder) {

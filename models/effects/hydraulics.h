@@ -37,6 +37,9 @@ double rated_flow(const Machine& machine, int cylinder, int side);
 Eigen::VectorXd total_return_flow(const MachineSeries& log);
 /// Flow a pump delivers to all its cylinders. [m^3/s]
 Eigen::VectorXd pump_flow(const MachineSeries& log, int pump);
+/// What a pump's pressure shows of a change of its demand: late where the model has a lag of the pump, else all of it at once.
+/// @param change [samples, Pa]
+Eigen::VectorXd reaching_pump(const MachineSeries& log, int pump, const Eigen::VectorXd& change);
 /// The force that a cylinder carries: measured, or by virtual work where it is not measured. [N]
 const Eigen::VectorXd& carried_force(const CylinderSeries& cylinder);
 /// CylinderSeries::steady_force where it is known, else carried_force. [N]

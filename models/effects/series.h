@@ -13,8 +13,8 @@ namespace sparflow {
 
 class Effect;
 
-/// The law of a model that says which share of a valve's flow the pressure drop over its edge passes (Effect::passed_flow).
-struct PassedFlowLaw {
+/// A law of the model through which other effects act.
+struct LawOfModel {
   const Effect* effect = nullptr;  ///< null: the model has no such law
   int at = -1;
   std::vector<double> values;  ///< [SI] by parameter
@@ -42,7 +42,7 @@ struct CylinderSeries {
   /// [-] share of the valve's flow that the measured pressure drop over its edge passes, by the model's law. What lowers the pump's
   /// pressure shows in it, and beside it in no flow. Empty: the model has no such law.
   Eigen::VectorXd passed;
-  PassedFlowLaw passing;  ///< the law of `passed`
+  LawOfModel passing;  ///< the law of `passed` (Effect::passed_flow)
   /// [Pa] pressures of the chambers, through the same filter as the position
   Eigen::VectorXd pressure_a, pressure_b;
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter
@@ -59,6 +59,7 @@ struct PumpSeries {
   Eigen::VectorXd demand;
   Eigen::VectorXi leader;  ///< load-sensing leader, -1 = standby
   double standby = 0.0;    ///< [Pa]
+  LawOfModel following;    ///< how the pressure follows the demand (Effect::followed_demand)
   std::vector<int> feeds;  ///< hydraulic cylinders, the columns of `asked`
   /// [samples x feeds, Pa] measured working pressure + margin of each cylinder, NaN at rest. No rows: not load-sensing.
   Eigen::MatrixXd asked;

@@ -54,7 +54,8 @@ const Named kMechanisms[] = {{"leaders", Mechanism::kLeaders},
                              {"event", Mechanism::kEvent},
                              {"settling", Mechanism::kSettling},
                              {"common_support", Mechanism::kCommonSupport},
-                             {"void", Mechanism::kVoid}};
+                             {"void", Mechanism::kVoid},
+                             {"pump_follows", Mechanism::kPumpFollows}};
 
 struct Options {
   int runs = 100;

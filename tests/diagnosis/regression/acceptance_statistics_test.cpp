@@ -123,7 +123,7 @@ TEST(EffectAction, HalfOfTheFormErrorOfALawThatBothLogsHaveIsTheSameInBoth) {
   const EffectDesign small = plain_design({ones});
   EffectFit fit = fit_effects(e, {&small});
   fit.theta << 10.0;
-  e.channels[0].shared = {{find_effect("flow_saturation"), 100.0 * ones}};
+  e.channels[0].shared = {{{find_effect("flow_saturation"), 0}, 100.0 * ones}};
   EXPECT_NEAR(effect_action(e, {&small}, 0, fit).over_form, 2.0, 1e-9);
   RegressionOptions whole;
   whole.shared_form_share = 1.0;

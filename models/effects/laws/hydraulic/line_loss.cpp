@@ -137,7 +137,7 @@ class LineLoss final : public Effect {
   /// The share solves share = passed(drop - loss(share * flow)), whose right side falls with the share.
   static Passed passed(const MachineSeries& log, int at, std::span<const double> p) {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    const PassedFlowLaw& law = c.passing;
+    const LawOfModel& law = c.passing;
     Passed out;
     if (law.effect == nullptr) return out;
     out.without = law.effect->passed_flow(log, at, law.at, law.values, {});
@@ -160,7 +160,7 @@ class LineLoss final : public Effect {
     return out;
   }
   /// By bisection between nothing and the share without a loss.
-  static Eigen::VectorXd share_passed(const MachineSeries& log, const PassedFlowLaw& law, int at,
+  static Eigen::VectorXd share_passed(const MachineSeries& log, const LawOfModel& law, int at,
                                       std::span<const double> p, const Passed& valve) {
     Eigen::VectorXd lo = Eigen::VectorXd::Zero(log.samples()), hi = valve.without.cwiseMax(0.0);
     Eigen::VectorXd lost(log.samples());

@@ -70,6 +70,8 @@ class PressureOffset final : public Effect {
       for (Eigen::Index k = 0; k < log.samples(); ++k) {
         if (leader[k] == at) columns(k, 0) = c.direction[k] > 0 ? -a : -b;
       }
+      const double size = info().parameters[0].typical;
+      columns.col(0) = reaching_pump(log, measured.index, size * columns.col(0)) / size;
       return true;
     }
     if (measured.index != at) return false;

@@ -70,14 +70,24 @@ class PumpLag final : public Effect {
     if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    columns = late(log, at, shape[0], shape[1]) - demand;
+    columns = late(log, at, demand, shape[0], shape[1]) - demand;
     return true;
   }
 
+  Eigen::VectorXd followed_demand(const MachineSeries& log, int pump, int at,
+                                  std::span<const double> p,
+                                  const Eigen::VectorXd& change) const override {
+    const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(pump)].demand;
+    if (pump != at || demand.size() == 0) return {};
+    const Eigen::VectorXd late_change =
+        late(log, at, demand + change, p[1], p[2]) - late(log, at, demand, p[1], p[2]);
+    return (1.0 - p[0]) * change + p[0] * late_change;
+  }
+
  private:
-  static Eigen::VectorXd late(const MachineSeries& log, int at, double tau, double form) {
+  static Eigen::VectorXd late(const MachineSeries& log, int at, const Eigen::VectorXd& demand,
+                              double tau, double form) {
     const PumpSeries& pump = log.pumps[static_cast<std::size_t>(at)];
-    const Eigen::VectorXd& demand = pump.demand;
     /// Damping ratio of a regulator that hunts.
     /// @threshold [1] 0.1..0.6; chosen: two or three swings are seen before the pressure rests
     constexpr double kDamping = 0.3;
