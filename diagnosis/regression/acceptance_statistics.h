@@ -15,7 +15,9 @@ struct EffectAction {
   /// [-] largest over channels of sqrt(sum c^4 / sum c^2) / noise, c = action of the effect less its projection on the
   /// baseline. The fourth powers measure the size where the effect acts: a lag shows only for a second after a step.
   double size = 0.0;
-  double absorbed = 0.0;  ///< 0..1 absorbed share over all channels, each in units of its noise
+  double absorbed =
+      0.0;  ///< 0..1 absorbed share over all channels, each in units of its noise; of a change, of what the same law in
+            ///< all logs leaves
   double absorbed_where_seen =
       1.0;  ///< 0..1 absorbed share in the channel in which most of the effect remains
   /// [-] size of the effect where it acts, divided by the model-form error of the other effects there (their

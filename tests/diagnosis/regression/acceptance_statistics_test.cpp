@@ -130,6 +130,31 @@ TEST(EffectAction, HalfOfTheFormErrorOfALawThatBothLogsHaveIsTheSameInBoth) {
   EXPECT_NEAR(effect_action(e, {&small}, 0, fit, whole).over_form, 1.0, 1e-9);
 }
 
+// The law that both logs have takes two thirds of a change of it where the suspect log has two thirds of the motion. No learned law
+// has any of that.
+TEST(EffectAction, WhatALawTakesOfItsOwnChangeIsNotAbsorbed) {
+  const VectorXd everywhere = pulses();
+  VectorXd here = everywhere;
+  here.tail(kRows / 3).setZero();
+  Evidence e = evidence_with(110.0 * here, 1.0, 6);
+  e.channels[0].baseline = everywhere;
+  EffectDesign change = plain_design({here});
+  change.effect = {find_effect("viscous_friction"), 0};
+  EffectFit fit = fit_effects(e, {&change});
+  fit.theta << 10.0;
+  const double part = here.squaredNorm() / everywhere.squaredNorm();
+  EXPECT_NEAR(effect_action(e, {&change}, 0, fit).absorbed, part, 1e-9);
+  const auto shared_by = [&](int at) {
+    e.channels[0].shared = {{{find_effect("viscous_friction"), at}, 100.0 * everywhere}};
+    return effect_action(e, {&change}, 0, fit).absorbed;
+  };
+  EXPECT_NEAR(shared_by(1), part, 1e-9) << "another cylinder's law";
+  EXPECT_NEAR(shared_by(0), 0.0, 1e-9);
+  e.channels[0].baseline.conservativeResize(kRows, 2);
+  e.channels[0].baseline.col(1) = here;
+  EXPECT_NEAR(shared_by(0), 1.0, 1e-9) << "a learned law has all of it";
+}
+
 TEST(OtherPower, IsTheFirstOrderOfAnotherExponent) {
   VectorXd v(kRows);
   for (Index k = 0; k < kRows; ++k) v[k] = 0.02 * static_cast<double>(k % 50 - 25);  // m/s

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <functional>
+#include <string>
+#include <tuple>
+#include <vector>
 
 #include "models/effects/hydraulics.h"
 #include "tests/models/effects/effect_series.h"
@@ -85,6 +88,65 @@ TEST_F(PumpEffects, PumpLagsOfAllFormsFollowTheirDifferentialEquations) {
     EXPECT_LT((c.col(0) - exact).norm(), (form == 1 || form == 2 ? 0.15 : 1e-3) * exact.norm())
         << form;
   }
+}
+
+/// A first-order lag in small steps. [Pa]
+VectorXd followed(const MachineSeries& log, const VectorXd& demand, double tau) {
+  VectorXd out = demand;
+  for (const auto& [first, last] : log.runs) {
+    double y = demand[first];
+    for (Index k = first + 1; k < last; ++k) {
+      constexpr int kSteps = 2000;
+      for (int i = 0; i < kSteps; ++i) y += (demand[k] - y) / tau * log.step / kSteps;
+      out[k] = y;
+    }
+  }
+  return out;
+}
+
+// What adds to a demand reaches the pressure of a pump that is late as late as the demand does; the model's lag says how late.
+TEST_F(PumpEffects, ChangesOfTheDemandShowByTheLagOfThePump) {
+  const double tau = 0.3, share = 0.8;
+  const auto columns = [&](const std::string& id, std::vector<double> shape, int at) {
+    MatrixXd c;
+    EXPECT_TRUE(effect_named(id).columns(log, {EvidenceKind::kPump, 0}, at, shape, c)) << id;
+    return c;
+  };
+  const std::vector<std::tuple<std::string, std::vector<double>, int>> changes = {
+      {"line_loss", {0.0}, 0}, {"flow_dependent_margin", {}, 0}, {"pressure_offset", {1.0}, 0}};
+  for (const auto& [id, shape, at] : changes) {
+    log.pumps[0].following = {};
+    const MatrixXd at_once = columns(id, shape, at);
+    log.pumps[0].following = {&effect_named("pump_lag"), 0, {share, tau, 0.0}};
+    const MatrixXd late = columns(id, shape, at);
+    for (Index k = 0; k < late.cols(); ++k) {
+      const VectorXd exact =
+          (1.0 - share) * at_once.col(k) + share * followed(log, at_once.col(k), tau);
+      // steps of 10 us are accurate to about h / tau
+      EXPECT_LT((late.col(k) - exact).norm(), 1e-3 * exact.norm()) << id;
+      EXPECT_GT((late.col(k) - at_once.col(k)).norm(), 0.01 * exact.norm()) << id;
+    }
+  }
+}
+
+// A pump that builds up by its own margin is not linear in its demand. The sum of demand, lag and loss is then the late pressure of
+// the whole demand where the loss has its usual size.
+TEST_F(PumpEffects, ALossAndALagOfThePumpAddUpToTheLateWhole) {
+  const Effect &lag = effect_named("pump_lag"), &loss = effect_named("line_loss");
+  const double k = loss.info().parameters[0].typical;
+  log.pumps[0].standby = 5 * kBar;  // so that the demand's steps exceed it
+  const std::vector<double> shape = {0.2, 4.0};
+  MatrixXd at_once, late, lagging;
+  ASSERT_TRUE(loss.columns(log, {EvidenceKind::kPump, 0}, 0, std::vector{0.0}, at_once));
+  ASSERT_TRUE(lag.columns(log, {EvidenceKind::kPump, 0}, 0, shape, lagging));
+  log.pumps[0].following = {&lag, 0, {1.0, shape[0], shape[1]}};
+  ASSERT_TRUE(loss.columns(log, {EvidenceKind::kPump, 0}, 0, std::vector{0.0}, late));
+  const VectorXd sum = log.pumps[0].demand + lagging.col(0) + k * late.col(0);
+  MachineSeries whole = log;
+  whole.pumps[0].demand += k * at_once.col(0);
+  ASSERT_TRUE(lag.columns(whole, {EvidenceKind::kPump, 0}, 0, shape, lagging));
+  const VectorXd exact = whole.pumps[0].demand + lagging.col(0);
+  EXPECT_LT((sum - exact).norm(), 1e-9 * exact.norm()) << "rounding only";
 }
 
 TEST_F(PumpEffects, TankLineRaisesEveryReturnChamberThatMoves) {
