@@ -164,8 +164,10 @@ void Evidence::add_shared(EvidenceChannel& channel) const {
         columns({effect.effect, effect.at}, shape, channel, {}, ActingLogs::kAll);
     if (acting.size() == 0) continue;
     const Eigen::Map<const VectorXd> values(linear.data(), static_cast<Index>(linear.size()));
-    channel.shared.push_back({{effect.effect, effect.at}, acting * values});
+    VectorXd together = acting * values;
     acting = acting_columns(acting);
+    channel.shared.push_back(
+        {{effect.effect, effect.at}, std::move(together), channel.baseline.cols(), acting.cols()});
     for (Index k = 0; k < acting.cols(); ++k) acting.col(k) /= acting.col(k).cwiseAbs().maxCoeff();
     Eigen::MatrixXd wider(channel.rows(), channel.baseline.cols() + acting.cols());
     wider << channel.baseline, acting;

@@ -43,7 +43,8 @@ struct EvidenceChannel {
   /// What the effects add that act in suspect and reference logs alike (EvidenceOptions::shared).
   struct SharedAction {
     EffectAt effect;
-    Eigen::VectorXd values;  ///< [rows, SI]
+    Eigen::VectorXd values;               ///< [rows, SI]
+    Eigen::Index first = 0, columns = 0;  ///< of the baseline, which are its own
   };
   std::vector<SharedAction> shared;
   double noise_floor =

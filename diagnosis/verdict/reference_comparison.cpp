@@ -242,12 +242,30 @@ double common_over_change(const Diagnosis& d, const EffectDesign& suspect, const
 }
 
 /// Fit of designs beside others, with covariance.
-EffectFit fit_beside(const Diagnosis& d, std::vector<const EffectDesign*> others,
-                     std::initializer_list<const EffectDesign*> more) {
+EffectFit fit_beside(const Evidence& evidence, std::vector<const EffectDesign*> others,
+                     std::initializer_list<const EffectDesign*> more, const EffectFit& start) {
   others.insert(others.end(), more);
   FitControl control;
   control.covariance = true;
-  return fit_effects(d.evidence, others, &d.search.final, control);
+  return fit_effects(evidence, others, &start, control);
+}
+
+/// The evidence in which a law that both logs have is not estimated anew: beside sizes of another variant of it in either group of
+/// logs, which are its part in either, it is not determined.
+Evidence with_law_fixed(const Evidence& evidence, const EffectAt& effect) {
+  Evidence out = evidence;
+  for (EvidenceChannel& channel : out.channels) {
+    const auto own =
+        std::find_if(channel.shared.begin(), channel.shared.end(),
+                     [&](const EvidenceChannel::SharedAction& s) { return s.effect == effect; });
+    if (own == channel.shared.end()) continue;
+    std::vector<Index> others;
+    for (Index k = 0; k < channel.baseline.cols(); ++k)
+      if (k < own->first || k >= own->first + own->columns) others.push_back(k);
+    channel.baseline = channel.baseline(Eigen::all, others).eval();
+    channel.shared.clear();  // their places in the baseline have changed
+  }
+  return out;
 }
 
 /// Linear parameters of an effect in both groups of logs. [SI]
@@ -317,8 +335,9 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
   const OtherEffects beside(d, found);
   const std::vector<const EffectDesign*>& others = beside.designs;
+  const Evidence evidence = shared ? d.evidence : with_law_fixed(d.evidence, suspect.effect);
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
-    return fit_beside(d, others, more);
+    return fit_beside(evidence, others, more, d.search.final);
   };
   const bool both = reference.acts();
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
@@ -326,7 +345,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
   const VectorXd nothing = VectorXd::Zero(suspect.linear);
   const SizeByLogs sizes =
-      size_by_logs(d.evidence, {suspect, reference, nothing, in_suspects, others}, apart);
+      size_by_logs(evidence, {suspect, reference, nothing, in_suspects, others}, apart);
   // two-sided, Bonferroni's bound over the effects found; the sizes' scatter is estimated from as many stretches of motion as there
   // are, so that Student's distribution replaces the normal one (Hartung and Knapp 2001, Statist. Med. 20, 3875)
   const double freedom = sizes.freedom;
@@ -374,7 +393,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(
-      d.evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
+      evidence, {suspect, reference, in_reference, in_suspects - in_reference, others}, apart);
   const double difference = difference_beside_form_error(d, suspect, {in_suspects, in_reference},
                                                          {sizes, change}, options.regression);
   if (!significant(difference)) return {};

@@ -170,6 +170,37 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
   }
 }
 
+/// Both logs have a dead band, and the change is best told by its other variant. In either group of logs the size of that variant is
+/// compared while the law that both have keeps its values: estimated anew, it would be the sum of both sizes, and neither is determined.
+TEST(ReferenceComparison, AnotherVariantOfALawThatBothLogsHaveIsCompared) {
+  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  const CraneModel model = CraneModel::untrained(loader());
+  const EffectAt band{find_effect("valve_deadband"), loader().cylinder_index("boom")};
+  for (const bool changed : {true, false}) {
+    EvidenceOptions options;
+    options.shared = {{band.effect, band.at, {0.05, 0.05, 0.0}, {}, {}}};
+    Diagnosis d;
+    d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
+                                  {make_signals(loader(), logs.reference)}, nullptr, options);
+    const auto at = d.evidence.find(EvidenceKind::kFlow, band.at) - d.evidence.channels.data();
+    EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+    FoundEffect found;
+    found.design = make_design(d.evidence, band, {1.0});
+    std::mt19937_64 random(2);
+    NoiseModel noise;
+    noise.variance = 1e-3 * 1e-3;  // [m^2/s^2]
+    channel.y = testing_support::draw(noise, channel.blocks, random) +
+                d.evidence.columns(band, std::vector{1.0}, channel, {},
+                                   changed ? ActingLogs::kSuspects : ActingLogs::kAll) *
+                    Eigen::Vector2d(0.04, 0.04);
+    d.search.found.push_back(std::move(found));
+    FitControl control;
+    control.keep_residuals = true;
+    d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
+    EXPECT_EQ(in_references(d, 0, {}), changed ? InReferences::kNot : InReferences::kAlike);
+  }
+}
+
 /// A friction of the boom in white noise, of one size in the suspect and of another in the reference log.
 struct Sizes {
   double suspect = 0.0, reference = 0.0;  ///< [N]
