@@ -105,6 +105,18 @@ VectorXd since_change(const MachineSeries& series, double least) {
   return since;
 }
 
+/// Lets the times begin anew as long before a change as a filter's window reaches: a filtered row there has its part of what follows.
+/// @param reach half the window [s]
+void begin_where_filters_reach(const MachineSeries& series, double reach, VectorXd& since) {
+  for (const auto& [first, last] : series.runs) {
+    double change = std::numeric_limits<double>::infinity();
+    for (Index k = last; k-- > first;) {
+      if (since[k] == 0.0) change = series.time[k];
+      if (change - series.time[k] <= reach) since[k] = 0.0;
+    }
+  }
+}
+
 /// Lets the times begin anew also where the pressure of a pump moves faster than `fastest` [Pa/s]: behind a slow or swinging pump
 /// nothing is settled, however long the commands have stood.
 void restart_where_pumps_move(const MachineSignals& signals, const MachineSeries& series,
@@ -242,6 +254,7 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
     if (e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling)) {
       VectorXd since = since_change(e.series[log], e.options.least_change);
       restart_where_pumps_move(s, e.series[log], e.options.fastest_settled, since);
+      begin_where_filters_reach(e.series[log], 0.5 * s.window, since);
       e.since_change.push_back(std::move(since));
     }
     add_kernels(s);

@@ -486,6 +486,40 @@ TEST(Evidence, WhileAPumpsPressureMovesNothingIsSettled) {
   EXPECT_GT(still[at], 0.5);
 }
 
+/// A filtered row has its part of what follows within half a window, so that the rows right before a lever moves are no steady ones.
+TEST(Evidence, RowsWhoseFilterReachesAMovingLeverAreNotSettled) {
+  const Machine machine = testing_support::drawn_machine("loader_crane");
+  const auto logs = testing_support::hidden_case(machine, {}, {5, 60.0});
+  EvidenceOptions options;
+  options.settles = true;
+  const CraneModel model = CraneModel::untrained(machine);
+  const auto settled_since = [&](const Log& log) {
+    const Evidence e = collect_evidence(model, {make_signals(machine, log)}, {}, nullptr, options);
+    return e.since_change.at(0);
+  };
+  const VectorXd still = settled_since(logs.train);
+  Eigen::Index last = 0;
+  still.unaryExpr([](double t) { return std::isfinite(t) ? t : 0.0; }).maxCoeff(&last);
+  const double moves = logs.train.time[last] - 0.5 * still[last];
+  Log moved = logs.train;
+  for (Channel& c : moved.channels) {
+    if (c.role != Role::kCommand) continue;
+    for (Eigen::Index k = 0; k < moved.samples(); ++k)
+      if (moved.time[k] >= moves && moved.time[k] < moves + 0.2) c.values[k] += 0.3;
+  }
+  const VectorXd since = settled_since(moved);
+  const double half = 0.5 * make_signals(machine, logs.train).window;
+  ASSERT_GT(0.5 * still[last], 2.0 * half);
+  for (Eigen::Index k = 0; k < since.size(); ++k) {
+    const double before = moves - moved.time[k];
+    if (before > 0.0 && before < 0.95 * half) {
+      EXPECT_EQ(since[k], 0.0) << before << " s before";
+    } else if (before > 1.1 * half && before < 2.0 * half) {
+      EXPECT_EQ(since[k], still[k]) << before << " s before";
+    }
+  }
+}
+
 /// At its pressure cut-off a pump does not follow the load, so that nothing there says what the model lacks; learning leaves it
 /// out, too.
 TEST(Evidence, APumpIsJudgedBelowItsCutOff) {
