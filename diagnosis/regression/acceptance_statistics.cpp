@@ -44,9 +44,9 @@ double size_where_it_acts(const VectorXd& action) {
 double beyond_own_law(const EvidenceChannel& channel, const EffectAt& effect,
                       const VectorXd& action) {
   for (const EvidenceChannel::SharedAction& s : channel.shared) {
-    const double squares = s.values.squaredNorm();
-    if (s.effect == effect && squares > 0.0)
-      return action.squaredNorm() - std::pow(s.values.dot(action), 2) / squares;
+    if (s.effect != effect || s.columns == 0) continue;
+    const MatrixXd own = channel.baseline.middleCols(s.first, s.columns);
+    return (action - own * least_squares(own, action)).squaredNorm();
   }
   return action.squaredNorm();
 }

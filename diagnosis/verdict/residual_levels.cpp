@@ -90,6 +90,11 @@ double chance_of_opposite_law(const Diagnosis& d, const ResidualStructure& left,
   return chance;
 }
 
+/// Bonferroni's bound over all channels and both ways in which a residual may exceed that of the references.
+double among_channels(const Diagnosis& d, double chance) {
+  return std::min(1.0, kWaysToExceed * static_cast<double>(d.evidence.channels.size()) * chance);
+}
+
 }  // namespace
 
 std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel) {
@@ -152,8 +157,7 @@ double reference_rms(const Diagnosis& d, std::size_t channel) {
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {
   const std::optional<Excess> excess = excess_over_references(d, channel);
   if (!excess) return std::nullopt;
-  return std::min(1.0, kWaysToExceed * static_cast<double>(d.evidence.channels.size()) *
-                           std::min(excess->level, excess->largest));
+  return among_channels(d, std::min(excess->level, excess->largest));
 }
 
 bool exceeds_references(const Diagnosis& d, std::size_t channel) {
@@ -165,11 +169,15 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
   std::optional<std::size_t> found;
   double least = d.thresholds.structure_false_alarm;
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
-    const double here = suspect_rms(d.evidence, c, d.search.final.residual[c]);
-    if (!(here > d.thresholds.least_excess_ratio * reference_rms(d, c))) continue;
-    const std::optional<double> chance = chance_beyond_references(d, c);
-    if (chance && *chance < least) {
-      least = *chance;
+    const std::optional<Excess> excess = excess_over_references(d, c);
+    if (!excess) continue;
+    // one stretch of motion hardly moves the RMS of the whole log; it has been compared with the references' largest one
+    const bool larger = suspect_rms(d.evidence, c, d.search.final.residual[c]) >
+                        d.thresholds.least_excess_ratio * reference_rms(d, c);
+    const double chance =
+        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->largest);
+    if (chance < least) {
+      least = chance;
       found = c;
     }
   }

@@ -145,7 +145,7 @@ TEST(EffectAction, WhatALawTakesOfItsOwnChangeIsNotAbsorbed) {
   const double part = here.squaredNorm() / everywhere.squaredNorm();
   EXPECT_NEAR(effect_action(e, {&change}, 0, fit).absorbed, part, 1e-9);
   const auto shared_by = [&](int at) {
-    e.channels[0].shared = {{{find_effect("viscous_friction"), at}, 100.0 * everywhere}};
+    e.channels[0].shared = {{{find_effect("viscous_friction"), at}, 100.0 * everywhere, 0, 1}};
     return effect_action(e, {&change}, 0, fit).absorbed;
   };
   EXPECT_NEAR(shared_by(1), part, 1e-9) << "another cylinder's law";

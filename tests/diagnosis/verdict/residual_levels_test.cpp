@@ -7,6 +7,7 @@
 #include <random>
 
 #include "diagnosis/residual/residual_model.h"
+#include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -18,8 +19,8 @@ using Eigen::VectorXd;
 
 constexpr double kNoise = 500.0;  // [N]
 
-/// Force of the boom in which a law of the boom's position remains: of one sign in the suspect, of another in the reference log.
-Diagnosis with_laws(double suspect, double reference) {
+/// A suspect and a reference log whose residuals are noise of one level in every channel.
+Diagnosis with_noise() {
   const Machine machine = testing_support::drawn_machine("loader_crane");
   static const auto logs = testing_support::hidden_case(machine, {}, {5, 90.0});
   Diagnosis d;
@@ -31,8 +32,26 @@ Diagnosis with_laws(double suspect, double reference) {
   for (EvidenceChannel& c : d.evidence.channels)
     c.y = testing_support::draw(noise, c.blocks, random);
   for (EvidenceChannel& c : d.evidence.channels) c.noise_floor = kNoise;
-  const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
-  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+  return d;
+}
+
+std::size_t jib_force(const Diagnosis& d) {
+  return static_cast<std::size_t>(d.evidence.find(EvidenceKind::kForce, 1) -
+                                  d.evidence.channels.data());
+}
+
+Diagnosis fitted(Diagnosis d) {
+  FitControl control;
+  control.keep_residuals = true;
+  d.search.final = fit_effects(d.evidence, {}, nullptr, control);
+  d.search.null = d.search.final;
+  return d;
+}
+
+/// Force of the jib in which a law of the boom's position remains: of one sign in the suspect, of another in the reference log.
+Diagnosis with_laws(double suspect, double reference) {
+  Diagnosis d = with_noise();
+  EvidenceChannel& channel = d.evidence.channels[jib_force(d)];
   const std::vector<SignalColumn> signals = channel_signals(d.evidence, channel);
   const auto position = std::find_if(signals.begin(), signals.end(),
                                      [](const SignalColumn& s) { return s.name == "q_boom"; });
@@ -42,11 +61,24 @@ Diagnosis with_laws(double suspect, double reference) {
     channel.y.segment(first, n) +=
         (channel.log[b] == 0 ? suspect : reference) * law.segment(first, n);
   }
-  FitControl control;
-  control.keep_residuals = true;
-  d.search.final = fit_effects(d.evidence, {}, nullptr, control);
-  d.search.null = d.search.final;
-  return d;
+  return fitted(std::move(d));
+}
+
+/// Force of the jib whose noise is a multiple of the usual in the shortest stretch of motion of either log.
+Diagnosis with_loud_stretch(double suspect, double reference) {
+  Diagnosis d = with_noise();
+  EvidenceChannel& channel = d.evidence.channels[jib_force(d)];
+  for (const int log : {0, 1}) {
+    NoiseBlock shortest = {0, channel.y.size()};
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      const NoiseBlock& rows = channel.blocks[b];
+      if (channel.log[b] == log && rows.last - rows.first < shortest.last - shortest.first)
+        shortest = rows;
+    }
+    channel.y.segment(shortest.first, shortest.last - shortest.first) *=
+        log == 0 ? suspect : reference;
+  }
+  return fitted(std::move(d));
 }
 
 BesideReferences beside(double suspect, double reference) {
@@ -67,6 +99,17 @@ TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) {
 
 TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) {
   EXPECT_EQ(beside(1.5, 0.0), BesideReferences::kMore);
+}
+
+/// A pump that hunts in one motion: the RMS of the log is not twice that of the references.
+TEST(ResidualLevels, OneStretchOfMotionIsComparedWithTheLargestOfTheReferences) {
+  const Diagnosis d = with_loud_stretch(8.0, 1.0);
+  const std::size_t jib = jib_force(d);
+  EXPECT_LT(suspect_rms(d.evidence, jib, d.search.final.residual[jib]),
+            d.thresholds.least_excess_ratio * reference_rms(d, jib));
+  EXPECT_EQ(channel_beyond_references(d), jib);
+  EXPECT_EQ(channel_beyond_references(with_loud_stretch(8.0, 8.0)), std::nullopt);
+  EXPECT_EQ(channel_beyond_references(with_loud_stretch(1.0, 1.0)), std::nullopt);
 }
 
 /// What the references leave as well is no sign against an effect in the suspect log, unless it has the opposite sign.
