@@ -57,16 +57,16 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
   return student_tail((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
 }
 
-/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
-/// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
-/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
-/// no difference.
+/// Deviation of the largest block of the suspect logs from the mean of the references' blocks, in standard errors of the prediction
+/// of one further block. A deviation in one stretch of motion hardly moves the mean level. Levels are no normal deviates: where
+/// the references have nearly as large a one, it is no difference, and this is nothing.
 /// @param excess ratio of the RMS
-double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
-  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
+std::optional<double> deviation_of_largest(const BlockLevel& suspect, const BlockLevel& reference,
+                                           double excess) {
+  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return std::nullopt;
   const double n = reference.blocks;
-  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  return suspect.blocks * student_tail((suspect.largest - reference.mean) / deviation, n - 1.0);
+  return (suspect.largest - reference.mean) /
+         std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
 }
 
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and
@@ -102,18 +102,23 @@ std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t cha
   const BlockLevel suspect = block_level(d, channel, false),
                    reference = block_level(d, channel, true);
   if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
-  const Excess excess{chance_of_level(suspect, reference),
-                      chance_of_largest(suspect, reference, d.thresholds.least_excess_ratio)};
+  Excess excess{chance_of_level(suspect, reference)};
+  if (const std::optional<double> largest =
+          deviation_of_largest(suspect, reference, d.thresholds.least_excess_ratio)) {
+    // Bonferroni's bound over the suspect blocks
+    excess.largest = suspect.blocks * student_tail(*largest, reference.blocks - 1.0);
+    excess.lone = suspect.blocks * 0.5 * std::exp(-std::numbers::sqrt2 * *largest);
+  }
   if (tracing())
     fmt::print(stderr,
                "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
-               "block {:.2g}, {} and {} blocks\n",
+               "block {:.2g} or {:.2g}, {} and {} blocks\n",
                d.evidence.channels[channel].text,
                suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
                    d.evidence.channels[channel].unit.si,
                reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name, excess.level, excess.largest, suspect.blocks,
-               reference.blocks);
+               d.evidence.channels[channel].unit.name, excess.level, excess.largest, excess.lone,
+               suspect.blocks, reference.blocks);
   return excess;
 }
 
@@ -175,7 +180,7 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
     const bool larger = suspect_rms(d.evidence, c, d.search.final.residual[c]) >
                         d.thresholds.least_excess_ratio * reference_rms(d, c);
     const double chance =
-        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->largest);
+        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->lone);
     if (chance < least) {
       least = chance;
       found = c;
