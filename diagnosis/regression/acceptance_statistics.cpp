@@ -207,10 +207,10 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   return result;
 }
 
-std::vector<bool> shape_choices(const Effect& effect) {
+std::vector<bool> shape_choices(const Effect& effect, std::span<const double> shape) {
   std::vector<bool> choices;
   for (const EffectParameter& p : effect.info().parameters) {
-    if (!p.linear) choices.push_back(p.choice);
+    if (!p.linear) choices.push_back(p.choice || is_absent(p, shape[choices.size()]));
   }
   return choices;
 }
@@ -219,7 +219,7 @@ EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& des
                                const VectorXd& theta) {
   EffectDesign result = design;
   result.number = 0;
-  const std::vector<bool> choices = shape_choices(*design.effect.effect);
+  const std::vector<bool> choices = shape_choices(*design.effect.effect, design.shape);
   for (std::size_t s = 0; s < design.shape.size(); ++s) {
     const double h = kSlopeStep * std::max(std::abs(design.shape[s]), 1e-9);
     std::vector<double> up = design.shape, down = design.shape;

@@ -1,6 +1,7 @@
 #pragma once
 /// Statistics of the acceptance tests of one effect beside its gain: size where it acts, absorbed share, gain on
 /// motions left out; and the derivatives from which nonlinear parameters get an interval.
+#include <span>
 #include <vector>
 
 #include "diagnosis/regression/effect_fit.h"
@@ -53,8 +54,9 @@ struct HeldOutGain {
 HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                           std::size_t index, const EffectFit& fit, int folds);
 
-/// For each nonlinear parameter, whether it is a choice among variants of a law instead of a continuous value.
-std::vector<bool> shape_choices(const Effect& effect);
+/// For each nonlinear parameter, whether it has no continuous value at this point: a choice among variants of a law, or an optional
+/// parameter that is absent.
+std::vector<bool> shape_choices(const Effect& effect, std::span<const double> shape);
 
 /// The design with one more column for each nonlinear parameter: d(action)/d(parameter) at `theta` [SI].
 EffectDesign with_shape_slopes(const Evidence& evidence, const EffectDesign& design,

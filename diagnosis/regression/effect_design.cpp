@@ -122,6 +122,18 @@ MatrixXd columns_of(const std::vector<const EffectDesign*>& designs, std::size_t
   return all;
 }
 
+int optional_shapes(const EffectDesign& design) {
+  if (design.shape.empty()) return 0;
+  int count = 0;
+  std::size_t k = 0;
+  for (const EffectParameter& p : design.effect.effect->info().parameters) {
+    if (p.linear) continue;
+    count += p.optional && !is_absent(p, design.shape[k]) ? 1 : 0;
+    ++k;
+  }
+  return count;
+}
+
 EffectDesign without_optional(EffectDesign design) {
   for (Index k = 0; k < design.linear; ++k) {
     if (!is_optional(design, k)) continue;

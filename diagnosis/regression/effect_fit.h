@@ -35,6 +35,9 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
                          std::vector<double> shape, std::span<const double> about = {},
                          bool optional = true);
 
+/// Number of the optional nonlinear parameters that a design has.
+int optional_shapes(const EffectDesign& design);
+
 /// The same design with the columns of its optional parameters set to zero.
 EffectDesign without_optional(EffectDesign design);
 

@@ -234,7 +234,8 @@ NullDistribution NullSimulator::distribution(const NullModel& null,
     const std::vector<EffectDesign>& designs = *candidates[k].designs;
     const std::vector<VectorXd> gains = simulation.gains(designs);
     for (std::size_t d = 0; d < designs.size(); ++d) {
-      const double besides = designs[d].optional ? candidates[k].optional_penalty : 0.0;
+      const double besides = (designs[d].optional ? candidates[k].optional_penalty : 0.0) +
+                             candidates[k].optional_shape_penalty * optional_shapes(designs[d]);
       best_[k] = best_[k].cwiseMax((gains[d].array() - besides).matrix());
     }
   });

@@ -28,8 +28,10 @@ struct NullDistribution {
 /// One candidate: its designs over the grid of nonlinear parameters, and its penalty.
 struct NullCandidate {
   const std::vector<EffectDesign>* designs = nullptr;
-  double penalty = 0.0;           ///< [nats]
-  double optional_penalty = 0.0;  ///< [nats] further penalty of designs with optional parameters
+  double penalty = 0.0;  ///< [nats]
+  double optional_penalty =
+      0.0;  ///< [nats] further penalty of designs with optional linear parameters
+  double optional_shape_penalty = 0.0;  ///< [nats] further penalty of each optional nonlinear one
 };
 
 /// The log without what is missing: evidence, and what is known of it.

@@ -248,7 +248,7 @@ class Estimator {
   }
 
   void refine(std::size_t d) {
-    const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect);
+    const std::vector<bool> choices = shape_choices(*designs_[d].effect.effect, designs_[d].shape);
     for (std::size_t s = 0; s < designs_[d].shape.size(); ++s) {
       if (choices[s]) continue;  // the grid contains all variants
       const auto [a, b] = bracket(d, s);

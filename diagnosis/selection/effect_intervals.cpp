@@ -146,7 +146,7 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
     VectorXd sd(designs[i].linear);
     for (Index k = 0; k < sd.size(); ++k)
       sd[k] = std::sqrt(std::max(0.0, sloped.covariance(at + k, at + k)));
-    const std::vector<bool> choices = shape_choices(effect);
+    const std::vector<bool> choices = shape_choices(effect, f.design.shape);
     std::vector<double> shape_sd(sd.begin() + linear, sd.end());
     for (std::size_t k = 0; k < shape_sd.size(); ++k) shape_sd[k] = choices[k] ? 0.0 : shape_sd[k];
     std::vector<double> half = parameter_values(effect, sd.head(linear), shape_sd);

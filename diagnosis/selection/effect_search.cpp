@@ -79,7 +79,7 @@ class Search {
     null_contexts_.resize(search_.candidates.size());
     for (std::size_t k = 0; k < search_.candidates.size(); ++k) {
       const SearchCandidate& c = search_.candidates[k];
-      candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
+      candidates.push_back({&c.designs, c.penalty, c.optional_penalty, c.optional_shape_penalty});
       std::vector<GainContext> now = search_.scores.contexts(base, current, k);
       unchanged.push_back(same_contexts(now, null_contexts_[k]));
       if (!unchanged.back()) null_contexts_[k] = std::move(now);

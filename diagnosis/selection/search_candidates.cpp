@@ -15,22 +15,34 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Every point with every value appended.
+std::vector<std::vector<double>> with_each(const std::vector<std::vector<double>>& points,
+                                           const std::vector<double>& values) {
+  std::vector<std::vector<double>> next;
+  next.reserve(points.size() * values.size());
+  for (const auto& point : points) {
+    for (const double v : values) {
+      next.push_back(point);
+      next.back().push_back(v);
+    }
+  }
+  return next;
+}
+
 std::vector<std::vector<double>> grid_of(const EffectAt& effect, const Evidence& evidence) {
   const MachineSeries& log = grid_log(evidence);
-  std::vector<std::vector<double>> points = {{}};
+  std::vector<std::vector<double>> points = {{}}, plain = {{}};
+  bool optional = false;
   int shape = 0;
   for (const EffectParameter& p : effect.effect->info().parameters) {
     if (p.linear) continue;
     const std::vector<double> values = effect.effect->grid(log, effect.at, shape++);
-    std::vector<std::vector<double>> next;
-    for (const auto& point : points) {
-      for (const double v : values) {
-        next.push_back(point);
-        next.back().push_back(v);
-      }
-    }
-    points = std::move(next);
+    points = with_each(points, values);
+    plain = with_each(plain, p.optional ? std::vector<double>{0.0} : values);
+    optional = optional || p.optional;
   }
+  // without the optional parameters first: of equal gains the first counts
+  if (optional) points.insert(points.begin(), plain.begin(), plain.end());
   if (!evidence.has_reference())
     std::erase_if(points, [&](const std::vector<double>& point) {
       return effect.effect->needs_reference(point);
@@ -71,6 +83,10 @@ double shape_penalty(const SearchCandidate& c, double each) {
   std::size_t k = 0;
   for (const EffectParameter& p : c.effect.effect->info().parameters) {
     if (p.linear) continue;
+    if (p.optional) {
+      ++k;
+      continue;
+    }
     std::vector<double> values;
     for (const EffectDesign& d : c.designs) values.push_back(d.shape[k]);
     std::sort(values.begin(), values.end());
@@ -114,6 +130,7 @@ std::vector<SearchCandidate> search_candidates(const Evidence& evidence,
   std::erase_if(all, [](const SearchCandidate& c) { return c.designs.empty(); });
   for (SearchCandidate& c : all) {
     const double each = 0.5 * std::log(rows);
+    c.optional_shape_penalty = each;
     c.linear = independent_columns(c.designs);
     const bool optional = std::any_of(c.designs.begin(), c.designs.end(),
                                       [](const EffectDesign& d) { return d.optional; });

@@ -13,10 +13,12 @@ struct SearchCandidate {
                          ///< the optional parameters where their columns are independent
   int linear = 1;        ///< number of linear parameters with independent columns, not optional
   double penalty = 0.0;  ///< [nats] subtracted from its gain
-  double optional_penalty = 0.0;  ///< [nats] further penalty of its optional parameters
+  double optional_penalty = 0.0;  ///< [nats] further penalty of its optional linear parameters
+  double optional_shape_penalty = 0.0;  ///< [nats] further penalty of each optional nonlinear one
 
   double penalty_of(const EffectDesign& design) const {
-    return penalty + (design.optional ? optional_penalty : 0.0);
+    return penalty + (design.optional ? optional_penalty : 0.0) +
+           optional_shape_penalty * optional_shapes(design);
   }
 };
 

@@ -63,7 +63,8 @@ bool merge(const SearchState& search, std::vector<FoundEffect>& found, EffectFit
 
 bool reshape(const SearchState& search, std::vector<FoundEffect>& found, std::size_t i,
              EffectFit& current) {
-  const std::vector<bool> choices = shape_choices(*found[i].design.effect.effect);
+  const std::vector<bool> choices =
+      shape_choices(*found[i].design.effect.effect, found[i].design.shape);
   if (std::find(choices.begin(), choices.end(), true) == choices.end()) return false;
   const std::vector<const EffectDesign*> others = designs_of(found, i);
   const EffectFit without = fit_effects(search.evidence, others, &current, {});

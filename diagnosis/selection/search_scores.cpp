@@ -218,13 +218,15 @@ LeastSquaresResidual SearchScores::least_squares(const std::vector<const EffectD
 /// only value.
 void SearchScores::refine_along(const Beside& beside, const SearchCandidate& candidate,
                                 std::size_t k, EffectDesign& d, double& at_best) const {
+  const EffectParameter& parameter = shape_parameter(*d.effect.effect, k);
   std::vector<double> values;
-  for (const EffectDesign& other : candidate.designs) values.push_back(other.shape[k]);
+  for (const EffectDesign& other : candidate.designs) {
+    if (!is_absent(parameter, other.shape[k])) values.push_back(other.shape[k]);
+  }
   std::sort(values.begin(), values.end());
   values.erase(std::unique(values.begin(), values.end()), values.end());
   double lo = d.shape[k], hi = d.shape[k];
   if (values.size() == 1) {
-    const EffectParameter& parameter = shape_parameter(*d.effect.effect, k);
     lo = std::max(parameter.lower, values.front() / kShapeReach);
     hi = std::min(parameter.upper, values.front() * kShapeReach);
   } else {
@@ -263,7 +265,7 @@ EffectDesign SearchScores::refined(const std::vector<const EffectDesign*>& base,
   const WhitenedChannels first = WhitenedChannels::by(evidence_, current.noise);
   const Beside beside{base, current, &first};
   double at_best = gain_beside(beside, d);
-  const std::vector<bool> choices = shape_choices(*d.effect.effect);
+  const std::vector<bool> choices = shape_choices(*d.effect.effect, d.shape);
   const auto free = std::count(choices.begin(), choices.end(), false);
   for (int sweep = 0; sweep < (free > 1 ? kShapeSweeps : 1); ++sweep) {
     const double before = at_best;

@@ -172,7 +172,8 @@ NullDistribution null_distribution_of(const std::vector<SearchCandidate>& all,
   std::vector<NullCandidate> null_candidates;
   null_candidates.reserve(all.size());
   for (const SearchCandidate& c : all)
-    null_candidates.push_back({&c.designs, c.penalty, c.optional_penalty});
+    null_candidates.push_back(
+        {&c.designs, c.penalty, c.optional_penalty, c.optional_shape_penalty});
   std::mt19937_64 random(search.seed);
   return simulate_null_distribution({logs.evidence, logs.fit}, null_candidates, search.simulations,
                                     random, search.regression);

@@ -436,24 +436,60 @@ void trace_channels(const Diagnosis& d, std::size_t found) {
   }
 }
 
-InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
-  if (tracing()) trace_channels(d, found);
-  const auto [by, proof] = by_size(d, found, options);
-  if (by == InReferences::kAlike || by == InReferences::kVaries || proof == Proof::kNone) return by;
+namespace {
+
+bool joins_both(InReferences there) {
+  return there == InReferences::kAlike || there == InReferences::kVaries;
+}
+
+/// Judges a significant difference by the residuals of both groups of logs.
+InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared) {
+  if (joins_both(compared.in_references) || compared.proof == Proof::kNone)
+    return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.
-  const bool change = needed(d, found, proof);
+  const bool change = needed(d, found, compared.proof);
   if (tracing())
     fmt::print(stderr, "  {} {} a change: without it the residual {} that of the references\n",
                effect_key(d.search.found[found].design.effect.effect->info(),
                           *d.evidence.series[0].machine, d.search.found[found].design.effect.at),
                change ? "is" : "is not", change ? "exceeds" : "does not exceed");
-  if (change) return by;
+  if (change) return compared.in_references;
   // Only what the references show as well is named as lacking in both.
-  return is_shared(d.evidence, d.search.found[found]) || by == InReferences::kNot
+  return is_shared(d.evidence, d.search.found[found]) ||
+                 compared.in_references == InReferences::kNot
              ? InReferences::kVaries
              : InReferences::kAlike;
 }
+
+}  // namespace
+
+InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
+  if (tracing()) trace_channels(d, found);
+  return by_residual(d, found, by_size(d, found, options));
+}
+
+namespace {
+
+/// The same for all effects found. Residuals of both groups are comparable only once what both have acts in both, so that
+/// differences of size which the residuals must prove are left as they are while another effect joins the references.
+/// @param last whether no further turn follows
+std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
+                                            bool last) {
+  std::vector<SizeVerdict> by;
+  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
+    if (tracing()) trace_channels(d, i);
+    by.push_back(by_size(d, i, options));
+  }
+  const bool joined = std::any_of(by.begin(), by.end(),
+                                  [](const SizeVerdict& v) { return joins_both(v.in_references); });
+  std::vector<InReferences> there;
+  for (std::size_t i = 0; i < by.size(); ++i)
+    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i]));
+  return there;
+}
+
+}  // namespace
 
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
                                       const DiagnoseOptions& options,
@@ -486,11 +522,13 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
   for (int turn = 0; turn < now.verdict.shared_turns; ++turn) {
     d = diagnose_sound(with, signals, now, part(0.4, 1.0));
     bool again = false;
+    const std::vector<InReferences> all =
+        all_in_references(d, now.search, turn + 1 == now.verdict.shared_turns);
     for (std::size_t i = 0; i < d.search.found.size(); ++i) {
       const FoundEffect& f = d.search.found[i];
       const bool shared = is_shared(d.evidence, f);
-      const InReferences there = in_references(d, i, now.search);
-      if (there != InReferences::kAlike && there != InReferences::kVaries) continue;
+      const InReferences there = all[i];
+      if (!joins_both(there)) continue;
       again = true;
       if (shared) {
         std::erase(now.candidates, f.design.effect);

@@ -33,7 +33,8 @@ struct EffectParameter {
   std::vector<double> grid;  ///< [SI] empty for linear ones
   /// Whether the grid's values name variants of the law, between which no value has a meaning.
   bool choice = false;
-  /// A linear parameter without which the effect is complete; a search adds it only where the log determines it.
+  /// A parameter without which the effect is complete; a search adds it only where the log determines it. A nonlinear one is absent
+  /// where it is zero; an effect has all of its optional nonlinear parameters or none.
   bool optional = false;
 };
 

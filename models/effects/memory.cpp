@@ -25,6 +25,13 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
   return y;
 }
 
+double limited_step(const LagStep& step, double limit, double tau) {
+  // Far below its target y rises along a straight line, from there on exponentially.
+  const double straight = std::clamp((step.target - limit - step.from) * tau / limit, 0.0, step.dt);
+  const double from = step.from + straight * limit / tau;
+  return step.target + std::exp(-(step.dt - straight) / tau) * (from - step.target);
+}
+
 Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, double limit,
                             double tau) {
   Eigen::VectorXd y = x;
@@ -32,11 +39,7 @@ Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, 
     for (Eigen::Index i = first + 1; i < last; ++i) {
       if (!std::isfinite(y[i - 1])) continue;  // Without a value before, the run starts here.
       const double target = std::isfinite(x[i]) ? x[i] : y[i - 1];
-      double from = y[i - 1], dt = log.time[i] - log.time[i - 1];
-      // Far below its target y rises along a straight line, from there on exponentially.
-      const double straight = std::clamp((target - limit - from) * tau / limit, 0.0, dt);
-      from += straight * limit / tau;
-      y[i] = target + std::exp(-(dt - straight) / tau) * (from - target);
+      y[i] = limited_step({y[i - 1], target, log.time[i] - log.time[i - 1]}, limit, tau);
     }
   }
   return y;

@@ -14,6 +14,13 @@ Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd&
 Eigen::VectorXd first_order_lag(const MachineSeries& log, const Eigen::VectorXd& x, double rising,
                                 double falling);
 
+/// A value, the target that it follows, and the time that it has. [s]
+struct LagStep {
+  double from = 0.0, target = 0.0, dt = 0.0;
+};
+/// The value after one step of limited_lag.
+double limited_step(const LagStep& step, double limit, double tau);
+
 /// Solves tau dy/dt = min(x - y, limit) in the same way: y rises no faster than limit / tau.
 /// @param limit in the unit of x, > 0  @param tau [s] > 0
 Eigen::VectorXd limited_lag(const MachineSeries& log, const Eigen::VectorXd& x, double limit,

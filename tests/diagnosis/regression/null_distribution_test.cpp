@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "models/effects/registry.h"
 #include "tests/diagnosis/evidence_support.h"
 
 namespace sparflow {
@@ -177,6 +178,17 @@ TEST(NullDistribution, MoreCandidatesRaiseTheThreshold) {
   const NullDistribution optional = simulate_null_distribution(
       {null.evidence, fit}, {{&wider, null.penalty, 3.0}}, kSimulations, d);
   EXPECT_NEAR(optional.threshold(0.05), narrow.threshold(0.05) - 3.0, 1e-9);
+  // a nonlinear one counts by itself: a pump's lag at a point that has three
+  std::vector<EffectDesign> shaped = null.catalogue[0];
+  const EffectAt lag{find_effect("pump_lag"), 0};
+  for (EffectDesign& design : shaped) {
+    design.effect = lag;
+    design.shape = {0.1, 0.0, 0.4, 0.1, 0.05};
+  }
+  std::mt19937_64 e(1);
+  const NullDistribution present = simulate_null_distribution(
+      {null.evidence, fit}, {{&shaped, null.penalty, 0.0, 1.0}}, kSimulations, e);
+  EXPECT_NEAR(present.threshold(0.05), narrow.threshold(0.05) - 3.0, 1e-9);
 }
 
 TEST(NullDistribution, PValueIsTheLargerOfBothDistributions) {

@@ -1,10 +1,14 @@
 #include "diagnosis/selection/search_candidates.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/selection/effect_estimate.h"
+#include "identification/signals/series.h"
 #include "models/effects/registry.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -16,6 +20,7 @@ using namespace testing_support;
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using ::testing::ElementsAre;
 
 /// A force in proportion to time, of which each log is said to tell further values.
 class TimeForce final : public Effect {
@@ -70,6 +75,31 @@ TEST(SearchCandidates, ValuesThatALogTellsCountAsParametersOfEachSuspectLog) {
   const double each = 0.5 * std::log(static_cast<double>(e.channels[0].rows()));
   EXPECT_DOUBLE_EQ(all[0].penalty, each);
   EXPECT_DOUBLE_EQ(all[1].penalty, each * (1 + 2 * 4));
+}
+
+/// A valve's lag has no optional parameter, a pump's has three.
+TEST(SearchCandidates, OptionalNonlinearParametersArePresentTogetherAndCountWhereTheyAre) {
+  const Machine machine = drawn_machine("loader_crane");
+  const HiddenCase logs = hidden_case(machine, {}, {5, 60.0});
+  const Evidence e =
+      collect_evidence(CraneModel::untrained(machine), {make_signals(machine, logs.train)});
+  const SearchCandidate lag = search_candidates(e, {parse_effect("pump_lag:main", machine)}).at(0);
+  const Effect& effect = *lag.effect.effect;
+  std::size_t with = 0, without = 0;
+  for (const EffectDesign& d : lag.designs) {
+    const int present = optional_shapes(d);
+    ASSERT_TRUE(present == 0 || present == 3);
+    (present == 0 ? without : with) += 1;
+    EXPECT_DOUBLE_EQ(lag.penalty_of(d), lag.penalty + present * lag.optional_shape_penalty);
+    // what is absent has no value to search for
+    EXPECT_THAT(shape_choices(effect, d.shape),
+                ElementsAre(false, true, present == 0, present == 0, present == 0));
+  }
+  EXPECT_EQ(with, without);
+  EXPECT_EQ(with, 50U);
+  double rows = 0.0;
+  for (const EvidenceChannel& c : e.channels) rows = std::max(rows, static_cast<double>(c.rows()));
+  EXPECT_DOUBLE_EQ(lag.optional_shape_penalty, 0.5 * std::log(rows));
 }
 
 /// The estimate stays beside the grid's values when it may not leave them; a start between them is one more.

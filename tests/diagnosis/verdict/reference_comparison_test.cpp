@@ -143,17 +143,21 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
   // [s] half width of the intervals of the time constants, and the variant of the law in the suspect log
   for (const auto& [half, form] : {std::pair{0.1, 0.0}, {0.01, 0.0}, {0.1, 1.0}}) {
     EvidenceOptions options;
-    options.shared = {{lag, 0, {1.0, 0.30, 0.0}, {0.9, 0.30 - half, 0.0}, {1.1, 0.30 + half, 0.0}}};
+    options.shared = {{lag,
+                       0,
+                       {1.0, 0.30, 0.0, 0.0, 0.0, 0.0},
+                       {0.9, 0.30 - half, 0.0, 0.0, 0.0, 0.0},
+                       {1.1, 0.30 + half, 0.0, 0.0, 0.0, 0.0}}};
     Diagnosis d;
     d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
                                   {make_signals(loader(), logs.reference)}, nullptr, options);
     const auto at = d.evidence.find(EvidenceKind::kPump, 0) - d.evidence.channels.data();
     EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
     FoundEffect found;
-    found.design = make_design(d.evidence, {lag, 0}, {0.36, form});
-    found.values = {1.0, 0.36, form};
-    found.lower95 = {0.9, 0.36 - half, form};
-    found.upper95 = {1.1, 0.36 + half, form};
+    found.design = make_design(d.evidence, {lag, 0}, {0.36, form, 0.0, 0.0, 0.0});
+    found.values = {1.0, 0.36, form, 0.0, 0.0, 0.0};
+    found.lower95 = {0.9, 0.36 - half, form, 0.0, 0.0, 0.0};
+    found.upper95 = {1.1, 0.36 + half, form, 0.0, 0.0, 0.0};
     std::mt19937_64 random(2);
     NoiseModel noise;
     noise.variance = 1e5 * 1e5;  // [Pa^2]

@@ -1,4 +1,7 @@
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <vector>
 
 #include "models/effects/builtin.h"
 #include "models/effects/memory.h"
@@ -15,42 +18,11 @@ class PumpLag final : public Effect {
         .stage = EffectStage::kPump,
         .place = EffectPlace::kPump,
         // The linear parameter switches the effect on or off; the time constant is searched.
-        .parameters =
-            {{"share",
-              "-",
-              1.0,
-              0.5,
-              2.0,
-              1.0,
-              "share of the demand's change that is delayed, about 1",
-              true,
-              {}},
-             {"tau",
-              "s",
-              1.0,
-              0.02,
-              2.0,
-              0.2,
-              "mean delay: time constant, of two stages their sum (mean of rising and falling), of "
-              "a swing 2 d / w",
-              false,
-              {0.03, 0.05, 0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7, 1.0}},
-             {"form",
-              "-",
-              1.0,
-              0.0,
-              4.0,
-              0.0,
-              "0: first order, 1: two equal stages, 2: two equal stages, rising four times "
-              "as fast as falling, 3: second order that swings (hunting regulator, "
-              "damping ratio 0.3), 4: first order, built up by its own margin (the load-sensing "
-              "port sees no more than the pump's pressure until the load's check valve opens)",
-              false,
-              {0.0, 1.0, 2.0, 3.0, 4.0},
-              true}},
+        .parameters = parameters(),
         .equation =
             "tau dp/dt + p = demand, or (tau/2 d/dt + 1)^2 p = demand, or p''/w^2 + 2 d p'/w + p = "
-            "demand, or tau dp/dt = min(demand - p, standby)",
+            "demand, or tau dp/dt = min(demand - p, standby); with late valves: the demand of "
+            "those open a time 'late' ago, and rest dp/dt = -p above standby where none was",
         .signals = {"pump pressure", "working pressures", "commands"},
         .confused_with = {"sensor_delay"},
         .separated_by = "repeated steps of one cylinder",
@@ -70,46 +42,206 @@ class PumpLag final : public Effect {
     if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    columns = late(log, at, demand, shape[0], shape[1]) - demand;
+    if (shape.size() > kOpening && shape[kRest] > 0.0 &&
+        log.pumps[static_cast<std::size_t>(at)].asked.rows() == 0)
+      return false;
+    columns = late(log, at, Eigen::VectorXd(), shape) - demand;
     return true;
   }
 
   Eigen::VectorXd followed_demand(const MachineSeries& log, int pump, int at,
                                   std::span<const double> p,
                                   const Eigen::VectorXd& change) const override {
-    const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(pump)].demand;
-    if (pump != at || demand.size() == 0) return {};
+    if (pump != at || log.pumps[static_cast<std::size_t>(pump)].demand.size() == 0) return {};
+    const std::span<const double> shape = p.subspan(1);
     const Eigen::VectorXd late_change =
-        late(log, at, demand + change, p[1], p[2]) - late(log, at, demand, p[1], p[2]);
+        late(log, at, change, shape) - late(log, at, Eigen::VectorXd(), shape);
     return (1.0 - p[0]) * change + p[0] * late_change;
   }
 
  private:
-  static Eigen::VectorXd late(const MachineSeries& log, int at, const Eigen::VectorXd& demand,
-                              double tau, double form) {
+  static std::vector<EffectParameter> parameters() {
+    return {{"share",
+             "-",
+             1.0,
+             0.5,
+             2.0,
+             1.0,
+             "share of the demand's change that is delayed, about 1",
+             true,
+             {}},
+            {"tau",
+             "s",
+             1.0,
+             0.02,
+             2.0,
+             0.2,
+             "mean delay: time constant, of two stages their sum (mean of rising and falling), of "
+             "a swing 2 d / w",
+             false,
+             {0.03, 0.05, 0.08, 0.12, 0.17, 0.24, 0.34, 0.48, 0.7, 1.0}},
+            {"form",
+             "-",
+             1.0,
+             0.0,
+             4.0,
+             0.0,
+             "0: first order, 1: two equal stages, 2: two equal stages, rising four times "
+             "as fast as falling, 3: second order that swings (hunting regulator, "
+             "damping ratio 0.3), 4: first order, built up by its own margin (the load-sensing "
+             "port sees no more than the pump's pressure until the load's check valve opens)",
+             false,
+             {0.0, 1.0, 2.0, 3.0, 4.0},
+             true},
+            {"rest",
+             "s",
+             1.0,
+             0.0,
+             10.0,
+             0.4,
+             "time constant with which the pressure falls by leakage while every valve is closed",
+             false,
+             {0.4},
+             false,
+             true},
+            {"late",
+             "s",
+             1.0,
+             0.0,
+             1.0,
+             0.1,
+             "delay between a lever and what its valve asks of the pump",
+             false,
+             {0.1},
+             false,
+             true},
+            {"opening",
+             "-",
+             1.0,
+             0.0,
+             0.5,
+             0.06,
+             "command from which a valve asks for pressure",
+             false,
+             {0.06},
+             false,
+             true}};
+  }
+
+  // no threshold: places among the nonlinear parameters
+  static constexpr std::size_t kTau = 0, kForm = 1, kRest = 2, kLate = 3, kOpening = 4;
+
+  /// Damping ratio of a regulator that hunts.
+  /// @threshold [1] 0.1..0.6; chosen: two or three swings are seen before the pressure rests
+  static constexpr double kDamping = 0.3;
+  /// Time constant while falling over that while rising, where they differ.
+  /// @threshold [1] 1..20; chosen: a regulator destrokes against its spring, and the lever's valve closes late
+  static constexpr double kFallingToRising = 4.0;
+
+  static constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+  enum class Form { kFirstOrder, kTwoStages, kFasterRising, kHunting, kOwnMargin };
+
+  /// What the valves ask for that are open late.
+  struct LateDemand {
+    Eigen::VectorXd pressure;  ///< [samples, Pa] demand, standby where every valve is closed
+    std::vector<char> closed;  ///< [samples] whether every valve is closed
+  };
+
+  static Eigen::VectorXd late(const MachineSeries& log, int at, const Eigen::VectorXd& change,
+                              std::span<const double> shape) {
     const PumpSeries& pump = log.pumps[static_cast<std::size_t>(at)];
-    /// Damping ratio of a regulator that hunts.
-    /// @threshold [1] 0.1..0.6; chosen: two or three swings are seen before the pressure rests
-    constexpr double kDamping = 0.3;
-    /// Time constant while falling over that while rising, where they differ.
-    /// @threshold [1] 1..20; chosen: a regulator destrokes against its spring, and the lever's valve closes late
-    constexpr double kFallingToRising = 4.0;
-    const double rising = 2.0 / (1.0 + kFallingToRising) * tau;
-    switch (static_cast<int>(std::lround(form))) {
-      case 0:
-        return first_order_lag(log, demand, tau);
-      case 1:
-        return first_order_lag(log, first_order_lag(log, demand, 0.5 * tau), 0.5 * tau);
-      case 2: {
+    const auto form = static_cast<Form>(std::lround(shape[kForm]));
+    if (shape.size() <= kOpening || shape[kRest] <= 0.0)
+      return followed(log, pump,
+                      change.size() > 0 ? Eigen::VectorXd(pump.demand + change) : pump.demand,
+                      {shape[kTau], form});
+    const LateDemand demand = of_open_valves(log, pump, change, shape[kLate], shape[kOpening]);
+    if (form == Form::kFirstOrder || form == Form::kOwnMargin)
+      return discharged(log, pump, demand, {shape[kTau], form, shape[kRest]});
+    return above_discharge(log, followed(log, pump, demand.pressure, {shape[kTau], form}), demand,
+                           shape[kRest]);
+  }
+
+  struct Times {
+    double tau = 0.0;
+    Form form = Form::kFirstOrder;
+    double rest = 0.0;
+  };
+
+  static Eigen::VectorXd followed(const MachineSeries& log, const PumpSeries& pump,
+                                  const Eigen::VectorXd& demand, const Times& t) {
+    const double rising = 2.0 / (1.0 + kFallingToRising) * t.tau;
+    switch (t.form) {
+      case Form::kFirstOrder:
+        return first_order_lag(log, demand, t.tau);
+      case Form::kTwoStages:
+        return first_order_lag(log, first_order_lag(log, demand, 0.5 * t.tau), 0.5 * t.tau);
+      case Form::kFasterRising: {
         const double r = 0.5 * rising, f = kFallingToRising * r;
         return first_order_lag(log, first_order_lag(log, demand, r, f), r, f);
       }
-      case 4:
-        return pump.standby > 0.0 ? limited_lag(log, demand, pump.standby, tau)
-                                  : first_order_lag(log, demand, tau);
+      case Form::kOwnMargin:
+        return pump.standby > 0.0 ? limited_lag(log, demand, pump.standby, t.tau)
+                                  : first_order_lag(log, demand, t.tau);
       default:
-        return second_order_lag(log, demand, 2.0 * kDamping / tau, kDamping);
+        return second_order_lag(log, demand, 2.0 * kDamping / t.tau, kDamping);
     }
+  }
+
+  /// A valve is open from a command `opening` on, a time `late` after the lever; one that closes late asks for what it asked last.
+  static LateDemand of_open_valves(const MachineSeries& log, const PumpSeries& pump,
+                                   const Eigen::VectorXd& change, double late, double opening) {
+    LateDemand out;
+    out.pressure = Eigen::VectorXd::Constant(log.samples(), pump.standby);
+    out.closed.assign(static_cast<std::size_t>(log.samples()), 1);
+    for (std::size_t f = 0; f < pump.feeds.size(); ++f) {
+      const Eigen::VectorXd& lever = log.cylinders[static_cast<std::size_t>(pump.feeds[f])].command;
+      if (lever.size() == 0) continue;
+      const Eigen::VectorXd valve = delayed(log, lever, late);
+      for (const auto& [first, last] : log.runs) {
+        // what it asked last, extending and retracting: the lever may be at rest or reversed already
+        double extending = kNothing, retracting = kNothing;
+        for (Eigen::Index k = first; k < last; ++k) {
+          const double now =
+              pump.asked(k, static_cast<Eigen::Index>(f)) + (change.size() > 0 ? change[k] : 0.0);
+          if (std::isfinite(now)) (lever[k] > 0.0 ? extending : retracting) = now;
+          const double asked = valve[k] > 0.0 ? extending : retracting;
+          if (!(std::abs(valve[k]) > opening) || !std::isfinite(asked)) continue;
+          out.closed[static_cast<std::size_t>(k)] = 0;
+          out.pressure[k] = std::max(out.pressure[k], asked);
+        }
+      }
+    }
+    return out;
+  }
+
+  /// One stage, which falls by leakage alone while every valve is closed.
+  static Eigen::VectorXd discharged(const MachineSeries& log, const PumpSeries& pump,
+                                    const LateDemand& demand, const Times& t) {
+    const bool limited = t.form == Form::kOwnMargin && pump.standby > 0.0;
+    Eigen::VectorXd y = demand.pressure;
+    for (const auto& [first, last] : log.runs) {
+      for (Eigen::Index k = first + 1; k < last; ++k) {
+        const double dt = log.time[k] - log.time[k - 1], from = y[k - 1], target = y[k];
+        if (demand.closed[static_cast<std::size_t>(k)] != 0 && from > target)
+          y[k] = std::max(target, from * std::exp(-dt / t.rest));
+        else
+          y[k] = limited ? limited_step({from, target, dt}, pump.standby, t.tau)
+                         : target + std::exp(-dt / t.tau) * (from - target);
+      }
+    }
+    return y;
+  }
+
+  /// The same where a pressure has several stages: it is no lower than what leakage leaves.
+  static Eigen::VectorXd above_discharge(const MachineSeries& log, Eigen::VectorXd y,
+                                         const LateDemand& demand, double rest) {
+    for (const auto& [first, last] : log.runs)
+      for (Eigen::Index k = first + 1; k < last; ++k)
+        if (demand.closed[static_cast<std::size_t>(k)] != 0)
+          y[k] = std::max(y[k], y[k - 1] * std::exp(-(log.time[k] - log.time[k - 1]) / rest));
+    return y;
   }
 };
 

@@ -2,7 +2,10 @@
 // recover.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -87,6 +90,98 @@ TEST_F(PumpEffects, PumpLagsOfAllFormsFollowTheirDifferentialEquations) {
     // Explicit steps of 10 us are accurate to about h / tau; between samples the second stage takes the first one as constant.
     EXPECT_LT((c.col(0) - exact).norm(), (form == 1 || form == 2 ? 0.15 : 1e-3) * exact.norm())
         << form;
+  }
+}
+
+/// Demand by the definition: a valve is open where its lever was beyond `opening` five samples ago, and asks for what its lever asked
+/// last on that side. NaN where all are closed. [Pa]
+VectorXd demand_of_open_valves(const MachineSeries& log, double opening) {
+  constexpr Index kLate = 5;
+  VectorXd demand = VectorXd::Constant(log.samples(), std::numeric_limits<double>::quiet_NaN());
+  for (const auto& [first, last] : log.runs) {
+    for (Index k = first; k < last; ++k) {
+      for (Index i = 0; i < 2; ++i) {
+        const VectorXd& lever = log.cylinders[static_cast<std::size_t>(i)].command;
+        const double valve = lever[std::max(first, k - kLate)];
+        if (std::abs(valve) <= opening) continue;
+        Index asked = k;
+        while (asked > first && lever[asked] * valve <= 0.0) --asked;
+        const double standby = log.pumps[0].standby;
+        demand[k] = std::fmax(std::fmax(demand[k], standby), log.pumps[0].asked(asked, i));
+      }
+    }
+  }
+  return demand;
+}
+
+// While every valve is closed the pressure falls by leakage, from what it was; a valve opens a time after its lever.
+TEST_F(PumpEffects, ThePumpLagOfLateValvesDischargesWhileTheyAreClosed) {
+  const double tau = 0.2, rest = 0.5, late = 5 * log.step, opening = 0.15;
+  PumpSeries& pump = log.pumps[0];
+  pump.standby = 12 * kBar;
+  pump.feeds = {0, 1};
+  pump.asked = MatrixXd::Constant(log.samples(), 2, std::numeric_limits<double>::quiet_NaN());
+  for (Index k = 0; k < log.samples(); ++k) {
+    for (Index i = 0; i < 2; ++i) {
+      const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(i)];
+      if (c.direction[k] != 0)
+        pump.asked(k, i) = (c.direction[k] > 0 ? c.pressure_a : c.pressure_b)[k] + 15 * kBar;
+    }
+  }
+  const VectorXd open = demand_of_open_valves(log, opening);
+  ASSERT_GT(open.array().isNaN().count(), 100);
+  for (const int form : {0, 4}) {
+    VectorXd p = pump.demand;
+    for (const auto& [first, last] : log.runs) {
+      p[first] = std::isnan(open[first]) ? pump.standby : open[first];
+      for (Index k = first + 1; k < last; ++k) {
+        constexpr int kSteps = 2000;
+        const double h = log.step / kSteps;
+        double y = p[k - 1];
+        for (int i = 0; i < kSteps; ++i) {
+          const double to = std::isnan(open[k]) ? pump.standby : open[k];
+          const double gap = form == 4 ? std::min(to - y, pump.standby) : to - y;
+          const bool leaks = std::isnan(open[k]) && y > to;
+          y += leaks ? std::max(-y / rest * h, to - y) : gap / tau * h;
+        }
+        p[k] = y;
+      }
+    }
+    MatrixXd c;
+    ASSERT_TRUE(effect_named("pump_lag")
+                    .columns(log, {EvidenceKind::kPump, 0}, 0,
+                             std::vector{tau, static_cast<double>(form), rest, late, opening}, c));
+    const VectorXd exact = p - pump.demand;
+    // Explicit steps of 10 us are accurate to about h / tau.
+    EXPECT_LT((c.col(0) - exact).norm(), 1e-3 * exact.norm()) << form;
+  }
+}
+
+// A regulator of several stages is no lower than what leakage leaves.
+TEST_F(PumpEffects, APumpOfSeveralStagesFallsNoFasterThanByLeakage) {
+  const double rest = 0.5;
+  PumpSeries& pump = log.pumps[0];
+  pump.standby = 20 * kBar;
+  pump.feeds = {0, 1};
+  pump.asked = MatrixXd::Constant(log.samples(), 2, 100 * kBar);
+  for (CylinderSeries& c : log.cylinders) {
+    c.command.setConstant(1.0);
+    c.command.segment(100, 200).setZero();
+  }
+  pump.demand.setConstant(100 * kBar);
+  pump.demand.segment(100, 200).setConstant(pump.standby);
+  for (const double form : {1.0, 2.0}) {
+    MatrixXd c;
+    ASSERT_TRUE(effect_named("pump_lag")
+                    .columns(log, {EvidenceKind::kPump, 0}, 0,
+                             std::vector{0.05, form, rest, 1e-9, 0.1}, c));
+    const VectorXd p = c.col(0) + pump.demand;
+    for (const Index k : {110, 130, 170})
+      EXPECT_NEAR(p[k],
+                  std::max(pump.standby,
+                           p[100] * std::exp(-log.step * static_cast<double>(k - 100) / rest)),
+                  1e-6 * p[100]);
+    EXPECT_NEAR(p[299], pump.standby, 1e-3 * kBar);
   }
 }
 
