@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "diagnosis/evidence/evidence.h"
 #include "identification/learning/fit.h"
 #include "identification/signals/series.h"
@@ -157,6 +159,7 @@ TEST(ApplyEffects, MarginsOfALaggingPumpAreLearned) {
   Log log = log_of(truth);
   CraneModel model = truth;
   model.effects = {typical("pump_lag:main", truth.machine)};
+  std::fill(model.effects[0].values.begin() + 3, model.effects[0].values.end(), 0.0);  // lag alone
   MachineSignals s = make_signals(truth.machine, log);
   MachineSeries series = make_series(truth, s);
   Eigen::VectorXd& pump = channel(log, "p_main").values;
