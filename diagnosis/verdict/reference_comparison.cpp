@@ -469,11 +469,6 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
   return by_residual(d, found, by_size(d, found, options));
 }
 
-namespace {
-
-/// The same for all effects found. Residuals of both groups are comparable only once what both have acts in both, so that
-/// differences of size which the residuals must prove are left as they are while another effect joins the references.
-/// @param last whether no further turn follows
 std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
                                             bool last) {
   std::vector<SizeVerdict> by;
@@ -488,8 +483,6 @@ std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOpti
     there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i]));
   return there;
 }
-
-}  // namespace
 
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
                                       const DiagnoseOptions& options,

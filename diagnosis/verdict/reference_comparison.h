@@ -20,6 +20,12 @@ enum class InReferences {
 /// Other effects found have sizes of their own in the references meanwhile.
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options);
 
+/// The same for all effects found. Residuals of both groups are comparable only once what both have acts in both, so that
+/// differences of size which the residuals must prove are left as they are while another effect joins the references.
+/// @param last whether no further turn follows
+std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
+                                            bool last);
+
 /// Diagnosis of suspect logs against references, in three steps: what the model lacks in the references alone; the
 /// difference of the suspect logs, with those effects estimated in all logs; and again, where an effect that was found
 /// as a difference is seen in the references as well.

@@ -205,14 +205,14 @@ TEST(ReferenceComparison, AnotherVariantOfALawThatBothLogsHaveIsCompared) {
   }
 }
 
-/// A friction of the boom in white noise, of one size in the suspect and of another in the reference log.
+/// A friction of the jib in white noise, of one size in the suspect and of another in the reference log.
 struct Sizes {
   double suspect = 0.0, reference = 0.0;  ///< [N]
   double deviation = 2000.0;              ///< of the noise [N]
   double louder = 1.0;                    ///< noise of the suspect log over that of the reference
   double least_explained = VerdictOptions{}.least_excess_explained;
 };
-InReferences compared_sizes(const Sizes& sizes) {
+Diagnosis with_sizes(const Sizes& sizes) {
   const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
   Diagnosis d;
   d.evidence =
@@ -239,8 +239,9 @@ InReferences compared_sizes(const Sizes& sizes) {
   FitControl control;
   control.keep_residuals = true;
   d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
-  return in_references(d, 0, {});
+  return d;
 }
+InReferences compared_sizes(const Sizes& sizes) { return in_references(with_sizes(sizes), 0, {}); }
 
 /// The residual of 2 kN is no larger with the friction left in it. In this draw the sizes then differ by 3.0, 3.9, 4.5 and 7.5 standard
 /// errors, which 17 stretches of motion tell: chances of 0.008, 0.0013, 0.0004 and less, of which the first two lie between both
@@ -250,6 +251,31 @@ TEST(ReferenceComparison, ADifferenceIsAChangeByItsSizeAloneOnlyIfItIsCertain) {
   EXPECT_EQ(compared_sizes({1000.0, 950.0}), InReferences::kAlike);
   EXPECT_EQ(compared_sizes({1000.0, 850.0}), InReferences::kOther);
   EXPECT_EQ(compared_sizes({1000.0, 350.0}), InReferences::kNot);
+}
+
+/// The difference of 1000 and 950 N is one that the residuals must prove. They do not while both logs have another friction, of the
+/// boom, which joins the references first; only in the last turn they must.
+TEST(ReferenceComparison, ResidualsProveADifferenceOnceWhatBothHaveActsInBoth) {
+  Diagnosis d = with_sizes({1000.0, 950.0});
+  const EffectAt friction{find_effect("viscous_friction"), loader().cylinder_index("boom")};
+  const auto at = d.evidence.find(EvidenceKind::kForce, friction.at) - d.evidence.channels.data();
+  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+  std::mt19937_64 random(3);
+  NoiseModel noise;
+  noise.variance = 200.0 * 200.0;  // [N^2]
+  channel.y = testing_support::draw(noise, channel.blocks, random) +
+              5e4 * d.evidence.columns(friction, {}, channel, {}, ActingLogs::kAll).col(0);
+  FoundEffect alike;
+  alike.design = make_design(d.evidence, friction, {});
+  d.search.found.push_back(std::move(alike));
+  FitControl control;
+  control.keep_residuals = true;
+  d.search.final = fit_effects(d.evidence, {&d.search.found[0].design, &d.search.found[1].design},
+                               nullptr, control);
+  EXPECT_THAT(all_in_references(d, {}, false),
+              ElementsAre(InReferences::kOther, InReferences::kAlike));
+  EXPECT_THAT(all_in_references(d, {}, true),
+              ElementsAre(InReferences::kAlike, InReferences::kAlike));
 }
 
 /// A suspect log that is twice as noisy as the reference exceeds it with the effect and without: of the squared residual beyond that of
