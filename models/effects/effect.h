@@ -34,7 +34,7 @@ struct EffectParameter {
   /// Whether the grid's values name variants of the law, between which no value has a meaning.
   bool choice = false;
   /// A parameter without which the effect is complete; a search adds it only where the log determines it. A nonlinear one is absent
-  /// where it is zero; an effect has all of its optional nonlinear parameters or none.
+  /// where it is zero; an effect has all of its optional nonlinear parameters or none, except those whose grid contains zero.
   bool optional = false;
 };
 

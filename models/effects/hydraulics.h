@@ -12,7 +12,8 @@ namespace units {
 // no threshold: units
 inline constexpr double kBarPerLpm = kBar / kLitrePerMinute;  ///< [Pa s/m^3] in one bar/(l/min)
 inline constexpr double kBarPerLpm2 =
-    kBar / (kLitrePerMinute * kLitrePerMinute);  ///< [Pa s^2/m^6] in one bar/(l/min)^2
+    kBar / (kLitrePerMinute * kLitrePerMinute);      ///< [Pa s^2/m^6] in one bar/(l/min)^2
+inline constexpr double kLitrePerBar = 1e-3 / kBar;  // [m^3/Pa]; no threshold: unit
 }  // namespace units
 
 /// Area of the supply chamber while moving to `side` (+1 extends, -1 retracts). [m^2]

@@ -183,7 +183,7 @@ TEST(NullDistribution, MoreCandidatesRaiseTheThreshold) {
   const EffectAt lag{find_effect("pump_lag"), 0};
   for (EffectDesign& design : shaped) {
     design.effect = lag;
-    design.shape = {0.1, 0.0, 0.4, 0.1, 0.05};
+    design.shape = {0.1, 0.0, 0.4, 0.1, 0.05, 0.0};
   }
   std::mt19937_64 e(1);
   const NullDistribution present = simulate_null_distribution(

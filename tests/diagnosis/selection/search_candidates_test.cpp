@@ -77,7 +77,7 @@ TEST(SearchCandidates, ValuesThatALogTellsCountAsParametersOfEachSuspectLog) {
   EXPECT_DOUBLE_EQ(all[1].penalty, each * (1 + 2 * 4));
 }
 
-/// A valve's lag has no optional parameter, a pump's has three.
+/// A pump's lag has three optional parameters in each variant, and one more in that of the flow balance.
 TEST(SearchCandidates, OptionalNonlinearParametersArePresentTogetherAndCountWhereTheyAre) {
   const Machine machine = drawn_machine("loader_crane");
   const HiddenCase logs = hidden_case(machine, {}, {5, 60.0});
@@ -85,18 +85,20 @@ TEST(SearchCandidates, OptionalNonlinearParametersArePresentTogetherAndCountWher
       collect_evidence(CraneModel::untrained(machine), {make_signals(machine, logs.train)});
   const SearchCandidate lag = search_candidates(e, {parse_effect("pump_lag:main", machine)}).at(0);
   const Effect& effect = *lag.effect.effect;
-  std::size_t with = 0, without = 0;
+  std::size_t with = 0, without = 0, balance = 0;
   for (const EffectDesign& d : lag.designs) {
     const int present = optional_shapes(d);
-    ASSERT_TRUE(present == 0 || present == 3);
-    (present == 0 ? without : with) += 1;
+    ASSERT_EQ(present == 4, d.shape[1] == 5.0);
+    ASSERT_TRUE(present == 0 || present == 3 || present == 4);
+    (present == 0 ? without : present == 3 ? with : balance) += 1;
     EXPECT_DOUBLE_EQ(lag.penalty_of(d), lag.penalty + present * lag.optional_shape_penalty);
     // what is absent has no value to search for
     EXPECT_THAT(shape_choices(effect, d.shape),
-                ElementsAre(false, true, present == 0, present == 0, present == 0));
+                ElementsAre(false, true, present == 0, present == 0, present == 0, present != 4));
   }
   EXPECT_EQ(with, without);
   EXPECT_EQ(with, 50U);
+  EXPECT_EQ(balance, 20U) << "ten times, two capacities";
   double rows = 0.0;
   for (const EvidenceChannel& c : e.channels) rows = std::max(rows, static_cast<double>(c.rows()));
   EXPECT_DOUBLE_EQ(lag.optional_shape_penalty, 0.5 * std::log(rows));

@@ -4,7 +4,10 @@
 #include <vector>
 
 #include "models/effects/builtin.h"
+#include "models/effects/hydraulics.h"
+#include "models/effects/laws/hydraulic/pump_regulator.h"
 #include "models/effects/memory.h"
+#include "models/effects/valve_flow.h"
 
 namespace sparflow {
 namespace {
@@ -22,7 +25,9 @@ class PumpLag final : public Effect {
         .equation =
             "tau dp/dt + p = demand, or (tau/2 d/dt + 1)^2 p = demand, or p''/w^2 + 2 d p'/w + p = "
             "demand, or tau dp/dt = min(demand - p, standby); with late valves: the demand of "
-            "those open a time 'late' ago, and rest dp/dt = -p above standby where none was",
+            "those open a time 'late' ago, and rest dp/dt = -p above standby where none was; "
+            "with the line's flow balance: C dp/dt = Q_pump - sum Q_valves - C p/rest, Q_pump by a "
+            "regulator with proportional and integral action",
         .signals = {"pump pressure", "working pressures", "commands"},
         .confused_with = {"sensor_delay"},
         .separated_by = "repeated steps of one cylinder",
@@ -42,9 +47,10 @@ class PumpLag final : public Effect {
     if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    if (shape.size() > kOpening && shape[kRest] > 0.0 &&
-        log.pumps[static_cast<std::size_t>(at)].asked.rows() == 0)
-      return false;
+    if (is_late(shape) && log.pumps[static_cast<std::size_t>(at)].asked.rows() == 0) return false;
+    const bool balance = form_of(shape) == Form::kFlowBalance;
+    if (balance != (shape.size() > kCapacity && shape[kCapacity] > 0.0)) return false;
+    if (balance && !(is_late(shape) && chambers_known(log, at))) return false;
     columns = late(log, at, Eigen::VectorXd(), shape) - demand;
     return true;
   }
@@ -84,14 +90,16 @@ class PumpLag final : public Effect {
              "-",
              1.0,
              0.0,
-             4.0,
+             5.0,
              0.0,
              "0: first order, 1: two equal stages, 2: two equal stages, rising four times "
              "as fast as falling, 3: second order that swings (hunting regulator, "
              "damping ratio 0.3), 4: first order, built up by its own margin (the load-sensing "
-             "port sees no more than the pump's pressure until the load's check valve opens)",
+             "port sees no more than the pump's pressure until the load's check valve opens), 5: "
+             "flow balance of the pump's line, regulator with proportional and integral action "
+             "of which tau is the time constant in front of closed valves",
              false,
-             {0.0, 1.0, 2.0, 3.0, 4.0},
+             {0.0, 1.0, 2.0, 3.0, 4.0, 5.0},
              true},
             {"rest",
              "s",
@@ -125,11 +133,24 @@ class PumpLag final : public Effect {
              false,
              {0.06},
              false,
+             true},
+            {"capacity",
+             "l/bar",
+             units::kLitrePerBar,
+             0.0,
+             0.1 * units::kLitrePerBar,
+             1e-3 * units::kLitrePerBar,
+             "oil that the line between pump and valves takes up with its pressure (volume over "
+             "bulk modulus); only with form 5",
+             false,
+             {0.0, 3e-4 * units::kLitrePerBar, 1e-3 * units::kLitrePerBar},
+             false,
              true}};
   }
 
   // no threshold: places among the nonlinear parameters
-  static constexpr std::size_t kTau = 0, kForm = 1, kRest = 2, kLate = 3, kOpening = 4;
+  static constexpr std::size_t kTau = 0, kForm = 1, kRest = 2, kLate = 3, kOpening = 4,
+                               kCapacity = 5;
 
   /// Damping ratio of a regulator that hunts.
   /// @threshold [1] 0.1..0.6; chosen: two or three swings are seen before the pressure rests
@@ -138,9 +159,23 @@ class PumpLag final : public Effect {
   /// @threshold [1] 1..20; chosen: a regulator destrokes against its spring, and the lever's valve closes late
   static constexpr double kFallingToRising = 4.0;
 
-  static constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  enum class Form { kFirstOrder, kTwoStages, kFasterRising, kHunting, kOwnMargin, kFlowBalance };
 
-  enum class Form { kFirstOrder, kTwoStages, kFasterRising, kHunting, kOwnMargin };
+  static bool is_late(std::span<const double> shape) {
+    return shape.size() > kOpening && shape[kRest] > 0.0;
+  }
+  static Form form_of(std::span<const double> shape) {
+    return static_cast<Form>(std::lround(shape[kForm]));
+  }
+  static bool chambers_known(const MachineSeries& log, int at) {
+    const std::vector<int>& feeds = log.pumps[static_cast<std::size_t>(at)].feeds;
+    return std::all_of(feeds.begin(), feeds.end(), [&](int i) {
+      const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(i)];
+      return c.command.size() > 0 && c.pressure_a.size() > 0 && c.pressure_b.size() > 0;
+    });
+  }
+
+  static constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
 
   /// What the valves ask for that are open late.
   struct LateDemand {
@@ -151,8 +186,11 @@ class PumpLag final : public Effect {
   static Eigen::VectorXd late(const MachineSeries& log, int at, const Eigen::VectorXd& change,
                               std::span<const double> shape) {
     const PumpSeries& pump = log.pumps[static_cast<std::size_t>(at)];
-    const auto form = static_cast<Form>(std::lround(shape[kForm]));
-    if (shape.size() <= kOpening || shape[kRest] <= 0.0)
+    const Form form = form_of(shape);
+    if (form == Form::kFlowBalance)
+      return regulated_pressure(log, pump.standby, sections(log, pump, change, shape),
+                                {shape[kTau], shape[kCapacity], shape[kRest]}, pump.demand);
+    if (!is_late(shape))
       return followed(log, pump,
                       change.size() > 0 ? Eigen::VectorXd(pump.demand + change) : pump.demand,
                       {shape[kTau], form});
@@ -214,6 +252,52 @@ class PumpLag final : public Effect {
       }
     }
     return out;
+  }
+
+  /// The same valves with the flows that they pass.
+  static std::vector<OpenSection> sections(const MachineSeries& log, const PumpSeries& pump,
+                                           const Eigen::VectorXd& change,
+                                           std::span<const double> shape) {
+    std::vector<OpenSection> out(pump.feeds.size());
+    for (std::size_t f = 0; f < pump.feeds.size(); ++f) {
+      const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(pump.feeds[f])];
+      const Eigen::VectorXd valve = delayed(log, c.command, shape[kLate]);
+      OpenSection& s = out[f];
+      s.load = Eigen::VectorXd::Constant(log.samples(), kNothing);
+      s.margin = s.flow = Eigen::VectorXd::Zero(log.samples());
+      Eigen::VectorXd opening = s.flow;
+      for (const auto& [first, last] : log.runs) {
+        double extending = kNothing, retracting = kNothing;
+        for (Eigen::Index k = first; k < last; ++k) {
+          const double asked = pump.asked(k, static_cast<Eigen::Index>(f));
+          if (std::isfinite(asked))
+            (c.command[k] > 0.0 ? extending : retracting) =
+                asked - (c.command[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]);
+          const double beyond = std::abs(valve[k]) - shape[kOpening];
+          s.margin[k] = valve[k] > 0.0 ? extending : retracting;
+          if (!(beyond > 0.0) || !(s.margin[k] > 0.0)) continue;
+          s.load[k] = (valve[k] > 0.0 ? c.pressure_a[k] : c.pressure_b[k]) +
+                      (change.size() > 0 ? change[k] : 0.0);
+          opening[k] = std::copysign(beyond, valve[k]);
+        }
+      }
+      add_flow(log, pump, pump.feeds[f], opening, s);
+    }
+    return out;
+  }
+
+  /// The flow of an open valve at its full pressure drop: the measured speed gives its gain, where the measured pressures leave a drop.
+  static void add_flow(const MachineSeries& log, const PumpSeries& pump, int cylinder,
+                       const Eigen::VectorXd& opening, OpenSection& section) {
+    Eigen::VectorXd passed = opening;
+    for (Eigen::Index k = 0; k < log.samples(); ++k)
+      if (opening[k] != 0.0 && std::isfinite(pump.pressure[k]))
+        passed[k] *= passed_share(pump.pressure[k] - section.load[k], section.margin[k]);
+    const SectionFit fit = fit_gains(log, cylinder, passed);
+    const Cylinder& c = log.machine->cylinders[static_cast<std::size_t>(cylinder)];
+    for (Eigen::Index k = 0; k < log.samples(); ++k)
+      section.flow[k] = std::max(0.0, fit.gain(opening[k])) * std::abs(opening[k]) *
+                        supply_area(c, opening[k] > 0.0 ? 1 : -1);
   }
 
   /// One stage, which falls by leakage alone while every valve is closed.
