@@ -72,12 +72,16 @@ bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
 
-/// Whether the found effect's columns act in all logs already, so that it is a difference.
-bool is_shared(const Evidence& evidence, const FoundEffect& f) {
+/// The effect of all logs with the found one's columns, of which that is a change; null: none.
+const AppliedEffect* shared_with(const Evidence& evidence, const FoundEffect& f) {
   const std::vector<AppliedEffect>& all = evidence.options.shared;
-  return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
+  const auto known = std::find_if(all.begin(), all.end(), [&](const AppliedEffect& e) {
     return same_place(e, f.design.effect) && same_shape(e, f);
   });
+  return known == all.end() ? nullptr : &*known;
+}
+bool is_shared(const Evidence& evidence, const FoundEffect& f) {
+  return shared_with(evidence, f) != nullptr;
 }
 
 /// Whether the references have the same effect with the same values, as far as both can tell: for every parameter the 95 %
@@ -200,7 +204,12 @@ bool needed(const Diagnosis& d, std::size_t found, Proof proof) {
     const std::optional<Excess> excess = excess_over_references(without, c);
     if (!excess) return true;
     tests += kWaysToExceed;
-    if (explained_excess(d, without, c) < d.thresholds.least_excess_explained) continue;
+    const double explained = explained_excess(d, without, c);
+    if (tracing())
+      fmt::print(stderr,
+                 "    in {} by chance: level {:.2g}, largest block {:.2g}; explained {:.2g}\n",
+                 d.evidence.channels[c].text, excess->level, excess->largest, explained);
+    if (explained < d.thresholds.least_excess_explained) continue;
     least = std::min({least, excess->level, excess->largest});
   }
   // an effect whose size differs has been selected already, so that its own channels alone count
@@ -277,6 +286,19 @@ struct SizesCompared {
   const SizeByLogs &from_nothing, &from_references;
 };
 
+/// A difference in standard errors of sampling alone, in those of sampling and form error.
+double beside_form_error(const Diagnosis& d, const EffectDesign& suspect,
+                         const InBothGroups& parameters, double sampling,
+                         const RegressionOptions& options) {
+  const double form = form_share(*suspect.effect.effect, options) *
+                      common_over_change(d, suspect, parameters.suspects, parameters.references);
+  const double difference = sampling / std::hypot(1.0, sampling * form);
+  if (tracing())
+    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
+               sampling, form, difference);
+  return difference;
+}
+
 /// Difference of both groups in standard errors of sampling and form error: the deviation of a law from the machine is another
 /// one in other motions, in proportion to the part of the effect that both groups have.
 double difference_beside_form_error(const Diagnosis& d, const EffectDesign& suspect,
@@ -295,13 +317,7 @@ double difference_beside_form_error(const Diagnosis& d, const EffectDesign& susp
                                : parameters.suspects,
                  there = single ? VectorXd(from_nothing.references.size * parameters.suspects)
                                 : parameters.references;
-  const double form =
-      form_share(*suspect.effect.effect, options) * common_over_change(d, suspect, here, there);
-  const double difference = sampling / std::hypot(1.0, sampling * form);
-  if (tracing())
-    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
-               sampling, form, difference);
-  return difference;
+  return beside_form_error(d, suspect, {here, there}, sampling, options);
 }
 
 /// Number of the suspect logs' stretches of motion in which an effect acts, in the channel where it acts in most.
@@ -327,15 +343,17 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   // a law with as many parameters as stretches of motion follows them whatever the cause is
   if (stretches_of(d.evidence, d.search.found[found].design) <= d.search.found[found].design.linear)
     return {InReferences::kVaries, Proof::kClearExcess};
-  const bool shared = is_shared(d.evidence, d.search.found[found]);
-  if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
+  const AppliedEffect* const shared = shared_with(d.evidence, d.search.found[found]);
+  if (shared == nullptr && within_intervals_of_references(d.evidence, d.search.found[found]))
+    return {};
   const EffectDesign& suspect = d.search.found[found].design;
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
-  if (shared)
+  if (shared != nullptr)
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
   const OtherEffects beside(d, found);
   const std::vector<const EffectDesign*>& others = beside.designs;
-  const Evidence evidence = shared ? d.evidence : with_law_fixed(d.evidence, suspect.effect);
+  const Evidence evidence =
+      shared != nullptr ? d.evidence : with_law_fixed(d.evidence, suspect.effect);
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     return fit_beside(evidence, others, more, d.search.final);
   };
@@ -358,15 +376,20 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return chance(z) < d.thresholds.difference_false_alarm;
   };
   const auto certain = [&](double z) {
+    if (tracing()) fmt::print(stderr, "    chance of a difference this large {:.2g}\n", chance(z));
     return chance(z) < d.thresholds.difference_alone_false_alarm;
   };
-  trace_sizes(d, suspect.effect, sizes, shared);
+  trace_sizes(d, suspect.effect, sizes, shared != nullptr);
   const bool taken_over = d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws;
-  if (shared)
-    return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
-            taken_over              ? Proof::kClearExcess
-            : certain(sizes.mean()) ? Proof::kNone
-                                    : Proof::kExcess};
+  if (shared != nullptr) {
+    const VectorXd there = Eigen::Map<const VectorXd>(shared->values.data(), suspect.linear);
+    const double change = beside_form_error(d, suspect, {there + in_suspects, there},
+                                            std::abs(sizes.mean()), options.regression);
+    return {significant(change) ? InReferences::kOther : InReferences::kVaries,
+            taken_over        ? Proof::kClearExcess
+            : certain(change) ? Proof::kNone
+                              : Proof::kExcess};
+  }
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -444,8 +467,9 @@ bool joins_both(InReferences there) {
 
 /// Judges a significant difference by the residuals of both groups of logs.
 InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared) {
-  if (joins_both(compared.in_references) || compared.proof == Proof::kNone)
-    return compared.in_references;
+  if (joins_both(compared.in_references)) return compared.in_references;
+  if (tracing() && compared.proof == Proof::kNone) needed(d, found, Proof::kExcess);
+  if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.
   const bool change = needed(d, found, compared.proof);
