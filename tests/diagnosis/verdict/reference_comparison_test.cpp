@@ -211,19 +211,23 @@ struct Sizes {
   double deviation = 2000.0;              ///< of the noise [N]
   double louder = 1.0;                    ///< noise of the suspect log over that of the reference
   double least_explained = VerdictOptions{}.least_excess_explained;
+  double known =
+      0.0;  ///< [N] the model's own friction of both logs, of which the found one is a change
 };
 Diagnosis with_sizes(const Sizes& sizes) {
   const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
+  const EffectAt friction{find_effect("coulomb_friction"), 1};
+  EvidenceOptions options;
+  if (sizes.known > 0.0) options.shared = {{friction.effect, friction.at, {sizes.known}, {}, {}}};
   Diagnosis d;
   d.evidence =
       collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
-                       {make_signals(loader(), logs.reference)});
+                       {make_signals(loader(), logs.reference)}, nullptr, options);
   const auto at = d.evidence.find(EvidenceKind::kForce, 1) - d.evidence.channels.data();
   EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
   std::mt19937_64 random(2);
   NoiseModel noise;
   noise.variance = sizes.deviation * sizes.deviation;
-  const EffectAt friction{find_effect("coulomb_friction"), 1};
   FoundEffect found;
   found.design = make_design(d.evidence, friction, {});
   channel.y = testing_support::draw(noise, channel.blocks, random);
@@ -289,6 +293,17 @@ TEST(ReferenceComparison, AnEffectThatExplainsLittleOfTheExcessIsNoChange) {
 TEST(ReferenceComparison, ADifferenceWithinTheFormErrorOfTheLawIsNoChange) {
   EXPECT_EQ(compared_sizes({1000.0, 1080.0, 40.0}), InReferences::kAlike);
   EXPECT_EQ(compared_sizes({1000.0, 1400.0, 40.0}), InReferences::kOther);
+}
+
+/// The same of another value of a law that the model has in both logs; a weaker one has less in common.
+TEST(ReferenceComparison, AnotherValueWithinTheFormErrorOfItsLawIsNoChange) {
+  const double explained = VerdictOptions{}.least_excess_explained;
+  const auto changed_by = [&](double change) {
+    return compared_sizes({change, 0.0, 40.0, 1.0, explained, 1000.0});
+  };
+  EXPECT_EQ(changed_by(80.0), InReferences::kVaries);
+  EXPECT_EQ(changed_by(400.0), InReferences::kOther);
+  EXPECT_EQ(compared_sizes({80.0, 0.0, 40.0, 1.0, explained, 100.0}), InReferences::kOther);
 }
 
 /// A valve whose flow falls with the load has the signature of a leak in motion; both logs have it, so that a reference tells them apart.
