@@ -365,4 +365,14 @@ EffectEstimate estimate_effects(const CraneModel& model, const std::vector<Effec
   return Estimator(model, wanted, std::move(logs), options).run(progress);
 }
 
+std::string why_no_finding(const EffectEstimate& all, const EffectDesign& design, std::size_t i) {
+  if (!all.significant[i])
+    return "the 95 % region of its values, estimated together, contains zero";
+  const std::vector<double>& values = all.effects[i].values;
+  if (rests_on_bound(design, Eigen::Map<const Eigen::VectorXd>(values.data(), design.linear)))
+    return "estimated together with the others, a parameter lies on the bound of its plausible "
+           "range";
+  return {};
+}
+
 }  // namespace sparflow

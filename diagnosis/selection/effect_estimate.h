@@ -53,4 +53,8 @@ EffectEstimate estimate_effects(const CraneModel& model, const std::vector<Effec
                                 EstimateLogs logs, const SearchProgress& progress = {},
                                 const EstimateOptions& options = {});
 
+/// @param design of the estimate's effect `i`  @return why it is no finding by the estimated values, as part of a sentence; empty: it
+///   is one
+std::string why_no_finding(const EffectEstimate& all, const EffectDesign& design, std::size_t i);
+
 }  // namespace sparflow

@@ -7,7 +7,6 @@
 #include <cmath>
 
 #include "diagnosis/experiment/experiment.h"
-#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
@@ -119,8 +118,8 @@ void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
   d.search.final = fit_without(d, d.search.found.size());
 }
 
-/// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets. An effect that is not
-/// significant by the values that would be reported is no finding; the last one found goes first, because others may hold part of it.
+/// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets. An effect that these values
+/// make no finding is dropped, the last one found first, because others may hold part of it.
 void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signals,
                          const EvidenceOptions& evidence, Diagnosis& d) {
   EstimateOptions options;
@@ -143,13 +142,17 @@ void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signal
                             {},
                             effects_in_references(model, signals.references)},
                            {}, options);
-    const auto nothing = std::find(all.significant.rbegin(), all.significant.rend(), false);
-    if (nothing == all.significant.rend()) break;
-    const auto at = std::ssize(found) - 1 - (nothing - all.significant.rbegin());
+    std::ptrdiff_t at = std::ssize(found) - 1;
+    std::string why;
+    for (; at >= 0; --at) {
+      const auto k = static_cast<std::size_t>(at);
+      why = why_no_finding(all, found[k].design, k);
+      if (!why.empty()) break;
+    }
+    if (at < 0) break;
+    const EffectAt& dropped = wanted[static_cast<std::size_t>(at)];
     d.notes.push_back(fmt::format(
-        "{} is not named: the 95 % region of its values, estimated together, contains zero",
-        effect_key(wanted[static_cast<std::size_t>(at)].effect->info(), model.machine,
-                   wanted[static_cast<std::size_t>(at)].at)));
+        "{} is not named: {}", effect_key(dropped.effect->info(), model.machine, dropped.at), why));
     found.erase(found.begin() + at);
   }
   if (found.size() < before) d.search.final = fit_without(d, found.size());

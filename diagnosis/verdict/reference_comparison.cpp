@@ -72,16 +72,12 @@ bool same_place(const AppliedEffect& a, const EffectAt& b) {
   return a.effect == b.effect && a.at == b.at;
 }
 
-/// The effect of all logs with the found one's columns, of which that is a change; null: none.
-const AppliedEffect* shared_with(const Evidence& evidence, const FoundEffect& f) {
+/// Whether the found effect's columns act in all logs already, so that it is a difference.
+bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   const std::vector<AppliedEffect>& all = evidence.options.shared;
-  const auto known = std::find_if(all.begin(), all.end(), [&](const AppliedEffect& e) {
+  return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
     return same_place(e, f.design.effect) && same_shape(e, f);
   });
-  return known == all.end() ? nullptr : &*known;
-}
-bool is_shared(const Evidence& evidence, const FoundEffect& f) {
-  return shared_with(evidence, f) != nullptr;
 }
 
 /// Whether the references have the same effect with the same values, as far as both can tell: for every parameter the 95 %
@@ -286,19 +282,6 @@ struct SizesCompared {
   const SizeByLogs &from_nothing, &from_references;
 };
 
-/// A difference in standard errors of sampling alone, in those of sampling and form error.
-double beside_form_error(const Diagnosis& d, const EffectDesign& suspect,
-                         const InBothGroups& parameters, double sampling,
-                         const RegressionOptions& options) {
-  const double form = form_share(*suspect.effect.effect, options) *
-                      common_over_change(d, suspect, parameters.suspects, parameters.references);
-  const double difference = sampling / std::hypot(1.0, sampling * form);
-  if (tracing())
-    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
-               sampling, form, difference);
-  return difference;
-}
-
 /// Difference of both groups in standard errors of sampling and form error: the deviation of a law from the machine is another
 /// one in other motions, in proportion to the part of the effect that both groups have.
 double difference_beside_form_error(const Diagnosis& d, const EffectDesign& suspect,
@@ -317,7 +300,13 @@ double difference_beside_form_error(const Diagnosis& d, const EffectDesign& susp
                                : parameters.suspects,
                  there = single ? VectorXd(from_nothing.references.size * parameters.suspects)
                                 : parameters.references;
-  return beside_form_error(d, suspect, {here, there}, sampling, options);
+  const double form =
+      form_share(*suspect.effect.effect, options) * common_over_change(d, suspect, here, there);
+  const double difference = sampling / std::hypot(1.0, sampling * form);
+  if (tracing())
+    fmt::print(stderr, "    by sampling {:.3g}, with a form error of {:.2g} of it {:.3g}\n",
+               sampling, form, difference);
+  return difference;
 }
 
 /// Number of the suspect logs' stretches of motion in which an effect acts, in the channel where it acts in most.
@@ -343,17 +332,15 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   // a law with as many parameters as stretches of motion follows them whatever the cause is
   if (stretches_of(d.evidence, d.search.found[found].design) <= d.search.found[found].design.linear)
     return {InReferences::kVaries, Proof::kClearExcess};
-  const AppliedEffect* const shared = shared_with(d.evidence, d.search.found[found]);
-  if (shared == nullptr && within_intervals_of_references(d.evidence, d.search.found[found]))
-    return {};
+  const bool shared = is_shared(d.evidence, d.search.found[found]);
+  if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
   const EffectDesign& suspect = d.search.found[found].design;
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
-  if (shared != nullptr)
+  if (shared)
     for (MatrixXd& m : reference.columns) m.resize(0, 0);
   const OtherEffects beside(d, found);
   const std::vector<const EffectDesign*>& others = beside.designs;
-  const Evidence evidence =
-      shared != nullptr ? d.evidence : with_law_fixed(d.evidence, suspect.effect);
+  const Evidence evidence = shared ? d.evidence : with_law_fixed(d.evidence, suspect.effect);
   const auto fit = [&](std::initializer_list<const EffectDesign*> more) {
     return fit_beside(evidence, others, more, d.search.final);
   };
@@ -379,17 +366,13 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     if (tracing()) fmt::print(stderr, "    chance of a difference this large {:.2g}\n", chance(z));
     return chance(z) < d.thresholds.difference_alone_false_alarm;
   };
-  trace_sizes(d, suspect.effect, sizes, shared != nullptr);
+  trace_sizes(d, suspect.effect, sizes, shared);
   const bool taken_over = d.search.found[found].absorbed > d.thresholds.absorbed_by_learned_laws;
-  if (shared != nullptr) {
-    const VectorXd there = Eigen::Map<const VectorXd>(shared->values.data(), suspect.linear);
-    const double change = beside_form_error(d, suspect, {there + in_suspects, there},
-                                            std::abs(sizes.mean()), options.regression);
-    return {significant(change) ? InReferences::kOther : InReferences::kVaries,
-            taken_over        ? Proof::kClearExcess
-            : certain(change) ? Proof::kNone
-                              : Proof::kExcess};
-  }
+  if (shared)
+    return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
+            taken_over              ? Proof::kClearExcess
+            : certain(sizes.mean()) ? Proof::kNone
+                                    : Proof::kExcess};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -465,9 +448,31 @@ bool joins_both(InReferences there) {
   return there == InReferences::kAlike || there == InReferences::kVaries;
 }
 
-/// Judges a significant difference by the residuals of both groups of logs.
-InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared) {
+/// Whether a difference to a law of the references improves the prediction of motions left out: Student's test on the folds' gains at
+/// the level of the sizes' difference. A law that is not exact has another size in other motions, by a few of them.
+bool predicts_left_out(const Diagnosis& d, const FoundEffect& f, const SearchOptions& options) {
+  const std::vector<AppliedEffect>& all = d.evidence.options.shared;
+  const bool known = std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
+    return same_place(e, f.design.effect);
+  });
+  if (!known) return true;
+  const double chance = student_tail(f.held_out / f.held_out_error, options.folds - 1.0);
+  if (tracing())
+    fmt::print(stderr, "    gain on motions left out {:.4g} +- {:.2g} nats, by chance {:.2g}\n",
+               f.held_out, f.held_out_error, chance);
+  return chance < d.thresholds.difference_false_alarm;
+}
+
+/// Judges a significant difference by the motions left out and by the residuals of both groups of logs.
+InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared,
+                         const SearchOptions& options) {
   if (joins_both(compared.in_references)) return compared.in_references;
+  // Only what the references show as well is named as lacking in both.
+  const InReferences no_change =
+      is_shared(d.evidence, d.search.found[found]) || compared.in_references == InReferences::kNot
+          ? InReferences::kVaries
+          : InReferences::kAlike;
+  if (!predicts_left_out(d, d.search.found[found], options)) return no_change;
   if (tracing() && compared.proof == Proof::kNone) needed(d, found, Proof::kExcess);
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
@@ -478,19 +483,14 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
                effect_key(d.search.found[found].design.effect.effect->info(),
                           *d.evidence.series[0].machine, d.search.found[found].design.effect.at),
                change ? "is" : "is not", change ? "exceeds" : "does not exceed");
-  if (change) return compared.in_references;
-  // Only what the references show as well is named as lacking in both.
-  return is_shared(d.evidence, d.search.found[found]) ||
-                 compared.in_references == InReferences::kNot
-             ? InReferences::kVaries
-             : InReferences::kAlike;
+  return change ? compared.in_references : no_change;
 }
 
 }  // namespace
 
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
   if (tracing()) trace_channels(d, found);
-  return by_residual(d, found, by_size(d, found, options));
+  return by_residual(d, found, by_size(d, found, options), options);
 }
 
 std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
@@ -504,7 +504,7 @@ std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOpti
                                   [](const SizeVerdict& v) { return joins_both(v.in_references); });
   std::vector<InReferences> there;
   for (std::size_t i = 0; i < by.size(); ++i)
-    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i]));
+    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i], options));
   return there;
 }
 

@@ -60,18 +60,6 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
   return student_tail((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
 }
 
-/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
-/// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
-/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
-/// no difference.
-/// @param excess ratio of the RMS
-double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
-  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
-  const double n = reference.blocks;
-  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  return suspect.blocks * student_tail((suspect.largest - reference.mean) / deviation, n - 1.0);
-}
-
 /// Variance of the logarithm of a mean square over rows of white noise: the trigamma function of half their number (Abramowitz
 /// and Stegun 1964, 6.4.3, 6.4.4 and 6.4.6).
 double variance_of_log(Index rows) {
@@ -82,9 +70,13 @@ double variance_of_log(Index rows) {
   return variance;
 }
 
-/// The same where nothing but that block speaks for a difference: by Laplace's distribution, whose variance is that between the
-/// references' blocks and what a block of so few rows has by itself (DerSimonian and Laird 1986, Control. Clin. Trials 7, 177).
-double chance_of_lone_block(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
+/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike, by
+/// Bonferroni's bound over the suspect blocks. A deviation in one stretch of motion hardly moves the mean level. Levels have heavier
+/// tails than normal deviates: by Laplace's distribution, whose variance is that between the references' blocks and what a
+/// block of so few rows has by itself (DerSimonian and Laird 1986, Control. Clin. Trials 7, 177). Where the references have
+/// nearly as large a one, it is no difference.
+/// @param excess ratio of the RMS
+double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
   const double n = reference.blocks;
   double within = 0.0;
   for (const Index rows : reference.rows) within += variance_of_log(rows) / n;
@@ -133,18 +125,17 @@ std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t cha
   if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
   const double ratio = d.thresholds.least_excess_ratio;
   const Excess excess{chance_of_level(suspect, reference),
-                      chance_of_largest(suspect, reference, ratio),
-                      chance_of_lone_block(suspect, reference, ratio)};
+                      chance_of_largest(suspect, reference, ratio)};
   if (tracing())
     fmt::print(stderr,
                "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
-               "block {:.2g} or {:.2g}, {} and {} blocks\n",
+               "block {:.2g}, {} and {} blocks\n",
                d.evidence.channels[channel].text,
                suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
                    d.evidence.channels[channel].unit.si,
                reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name, excess.level, excess.largest, excess.lone,
-               suspect.blocks, reference.blocks);
+               d.evidence.channels[channel].unit.name, excess.level, excess.largest, suspect.blocks,
+               reference.blocks);
   return excess;
 }
 
@@ -206,7 +197,7 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
     const bool larger = suspect_rms(d.evidence, c, d.search.final.residual[c]) >
                         d.thresholds.least_excess_ratio * reference_rms(d, c);
     const double chance =
-        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->lone);
+        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->largest);
     if (chance < least) {
       least = chance;
       found = c;
@@ -229,12 +220,16 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
     });
     const std::size_t channel = left[i].channel;
     const double floor = d.evidence.channels[channel].noise_floor;
-    const double rms = reference_rms(d, channel);
+    const auto beyond_noise = [&](double rms) {
+      return std::max(0.0, rms * rms - (std::isfinite(floor) ? floor * floor : 0.0));
+    };
     // an oscillation is measured before the filter, so after it the residual limits it
     const double here =
-        std::min(left[i].rms, suspect_rms(d.evidence, channel, d.search.final.residual[channel]));
-    const bool room = rms * rms - (std::isfinite(floor) ? floor * floor : 0.0) >=
-                      std::pow(here / d.thresholds.least_excess_ratio, 2);
+        std::min(left[i].rms * left[i].rms,
+                 beyond_noise(suspect_rms(d.evidence, channel, d.search.final.residual[channel])));
+    const bool room =
+        beyond_noise(reference_rms(d, channel)) * std::pow(d.thresholds.least_excess_ratio, 2) >=
+        here;
     // one that is weaker than what counts as an oscillation is one all the same
     const bool oscillates =
         left[i].oscillation &&

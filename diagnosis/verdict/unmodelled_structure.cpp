@@ -65,9 +65,11 @@ double unmodelled_share(const Diagnosis& d, const ResidualStructure& left,
   const double after = suspect_rms(d.evidence, left.channel, final);
   const double catalogue = std::max(0.0, before * before - after * after);
   // an intermittent oscillation is measured where it occurs, so over the whole log it is limited by the residual
-  double flexible = std::min(left.rms * left.rms, after * after);
-  const double there = reference_rms(d, left.channel, final);
   const double floor = d.evidence.channels[left.channel].noise_floor;
+  const double beyond_noise =
+      std::max(0.0, after * after - (std::isfinite(floor) ? floor * floor : 0.0));
+  double flexible = std::min(left.rms * left.rms, beyond_noise);
+  const double there = reference_rms(d, left.channel, final);
   if (beside != BesideReferences::kOpposite && there > floor)
     flexible = std::max(0.0, flexible - (there * there - floor * floor));
   return flexible / std::max(catalogue + flexible, 1e-300);

@@ -104,6 +104,25 @@ TEST(SearchCandidates, OptionalNonlinearParametersArePresentTogetherAndCountWher
   EXPECT_DOUBLE_EQ(lag.optional_shape_penalty, 0.5 * std::log(rows));
 }
 
+/// Of a valve's lag half of the flow is late at least; an estimate there says that another law is the cause.
+TEST(EffectEstimate, ValuesOnABoundAreNoFinding) {
+  const EffectAt lag{find_effect("valve_lag"), 0};
+  EffectDesign design;
+  design.effect = lag;
+  design.linear = 1;
+  design.lower = {0.5};
+  design.upper = {2.0};
+  design.columns = {Eigen::MatrixXd::Ones(3, 1)};
+  EffectEstimate all;
+  all.effects = {{lag.effect, 0, {0.5, 0.1, 0.0}, {}, {}}};
+  all.significant = {true};
+  EXPECT_THAT(why_no_finding(all, design, 0), testing::HasSubstr("bound"));
+  all.effects[0].values[0] = 0.7;
+  EXPECT_EQ(why_no_finding(all, design, 0), "");
+  all.significant = {false};
+  EXPECT_THAT(why_no_finding(all, design, 0), testing::HasSubstr("contains zero"));
+}
+
 /// The estimate stays beside the grid's values when it may not leave them; a start between them is one more.
 TEST(EffectEstimate, TriesTheStartsBesideTheGrid) {
   const Machine machine = drawn_machine("loader_crane");

@@ -190,6 +190,8 @@ TEST(ReferenceComparison, AnotherVariantOfALawThatBothLogsHaveIsCompared) {
     EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
     FoundEffect found;
     found.design = make_design(d.evidence, band, {1.0});
+    found.held_out = 100.0;  // [nats]
+    found.held_out_error = 1.0;
     std::mt19937_64 random(2);
     NoiseModel noise;
     noise.variance = 1e-3 * 1e-3;  // [m^2/s^2]
@@ -295,15 +297,19 @@ TEST(ReferenceComparison, ADifferenceWithinTheFormErrorOfTheLawIsNoChange) {
   EXPECT_EQ(compared_sizes({1000.0, 1400.0, 40.0}), InReferences::kOther);
 }
 
-/// The same of another value of a law that the model has in both logs; a weaker one has less in common.
-TEST(ReferenceComparison, AnotherValueWithinTheFormErrorOfItsLawIsNoChange) {
-  const double explained = VerdictOptions{}.least_excess_explained;
-  const auto changed_by = [&](double change) {
-    return compared_sizes({change, 0.0, 40.0, 1.0, explained, 1000.0});
+/// Another value of a law that the references have must improve the prediction of motions left out: by 3.75 standard errors of five folds
+/// at one in a hundred. A law that they do not have need not.
+TEST(ReferenceComparison, AnotherValueOfALawMustPredictMotionsLeftOut) {
+  const auto compared = [](double known, double standard_errors) {
+    Diagnosis d =
+        with_sizes({400.0, 0.0, 40.0, 1.0, VerdictOptions{}.least_excess_explained, known});
+    d.search.found[0].held_out = 100.0;  // [nats]
+    d.search.found[0].held_out_error = 100.0 / standard_errors;
+    return in_references(d, 0, {});
   };
-  EXPECT_EQ(changed_by(80.0), InReferences::kVaries);
-  EXPECT_EQ(changed_by(400.0), InReferences::kOther);
-  EXPECT_EQ(compared_sizes({80.0, 0.0, 40.0, 1.0, explained, 100.0}), InReferences::kOther);
+  EXPECT_EQ(compared(1000.0, 3.7), InReferences::kVaries);
+  EXPECT_EQ(compared(1000.0, 3.8), InReferences::kOther);
+  EXPECT_EQ(compared(0.0, 1.0), InReferences::kNot);
 }
 
 /// A valve whose flow falls with the load has the signature of a leak in motion; both logs have it, so that a reference tells them apart.

@@ -123,5 +123,30 @@ TEST(ResidualLevels, OnlyWhatTheReferencesDoNotLeaveIsUnmodelled) {
   EXPECT_EQ(share(1.5, -1.6, BesideReferences::kOpposite), 1.0);
 }
 
+/// An oscillation is measured before the filter. Where the filtered residual is the sensors' noise, in the references as well, it is
+/// no change, however large it was before; the same residual over a floor that is nine tenths smaller is one.
+TEST(ResidualLevels, AnOscillationIsLimitedByTheResidualBeyondTheNoise) {
+  Diagnosis d = with_laws(0.0, 0.0);
+  const std::size_t jib = jib_force(d);
+  ResidualStructure left;
+  left.channel = jib;
+  left.oscillation = true;
+  left.rms = 3.0 * kNoise;
+  double& floor = d.evidence.channels[jib].noise_floor;
+  const double here = suspect_rms(d.evidence, jib, d.search.final.residual[jib]);
+  floor = here;
+  EXPECT_EQ(unmodelled_share(d, left, BesideReferences::kMore), 0.0);
+  EXPECT_EQ(beside_references(d, {left}, {}).at(0), BesideReferences::kShared);
+  floor = 0.1 * here;
+  d.search.final.residual[jib] = d.search.final.residual[jib].eval();
+  for (std::size_t b = 0; b < d.evidence.channels[jib].blocks.size(); ++b) {
+    const NoiseBlock& rows = d.evidence.channels[jib].blocks[b];
+    if (d.evidence.channels[jib].log[b] != 0)
+      d.search.final.residual[jib].segment(rows.first, rows.last - rows.first) *= 0.1;
+  }
+  EXPECT_GT(unmodelled_share(d, left, BesideReferences::kMore), 0.9);
+  EXPECT_EQ(beside_references(d, {left}, {}).at(0), BesideReferences::kMore);
+}
+
 }  // namespace
 }  // namespace sparflow
