@@ -91,14 +91,15 @@ std::vector<LogFault> sensor_faults(const Diagnosis& d, const std::vector<LogFau
 }
 
 /// Drops minor effects when other effects remain; their error becomes `unexplained`.
-void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
+/// @return whether there were any
+bool drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
   std::vector<DiagnosedEffect> all;
   all.reserve(d.search.found.size());
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     all.push_back(describe_effect(d, i, options));
   const auto minor = std::count_if(all.begin(), all.end(),
                                    [&](const DiagnosedEffect& e) { return is_minor_effect(d, e); });
-  if (minor == 0 || minor == std::ssize(all)) return;
+  if (minor == 0 || minor == std::ssize(all)) return false;
   std::vector<FoundEffect> kept;
   kept.reserve(all.size());
   for (std::size_t i = 0; i < all.size(); ++i) {
@@ -116,6 +117,7 @@ void drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
   }
   d.search.found = std::move(kept);
   d.search.final = fit_without(d, d.search.found.size());
+  return true;
 }
 
 /// Replaces the values by a joint estimate of all effects, the one that an extension of the model gets. An effect that these values
@@ -299,10 +301,12 @@ Diagnosis diagnose_once(const CraneModel& model, const DiagnosisSignals& signals
                                 options.evidence);
   d.notes = d.evidence.notes;
   search(model, options, progress, d);
-  if (progress) progress(0.92, "searching for unmodelled structure in the residual");
-  const std::vector<ResidualStructure> unmodelled = find_unmodelled(options, d);
-  drop_minor_effects(d, options.search);
   set_joint_estimates(model, signals, options.evidence, d);
+  if (progress) progress(0.92, "searching for unmodelled structure in the residual");
+  // in the residual of the effects that are findings
+  const std::vector<ResidualStructure> unmodelled = find_unmodelled(options, d);
+  if (drop_minor_effects(d, options.search))
+    set_joint_estimates(model, signals, options.evidence, d);
   for (std::size_t i = 0; i < d.search.found.size(); ++i)
     d.effects.push_back(describe_effect(d, i, options.search));
   set_verdict(unmodelled, d);

@@ -191,15 +191,12 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
   std::optional<std::size_t> found;
   double least = d.thresholds.structure_false_alarm;
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
-    const std::optional<Excess> excess = excess_over_references(d, c);
-    if (!excess) continue;
-    // one stretch of motion hardly moves the RMS of the whole log; it has been compared with the references' largest one
-    const bool larger = suspect_rms(d.evidence, c, d.search.final.residual[c]) >
-                        d.thresholds.least_excess_ratio * reference_rms(d, c);
-    const double chance =
-        among_channels(d, larger ? std::min(excess->level, excess->largest) : excess->largest);
-    if (chance < least) {
-      least = chance;
+    if (!(suspect_rms(d.evidence, c, d.search.final.residual[c]) >
+          d.thresholds.least_excess_ratio * reference_rms(d, c)))
+      continue;
+    const std::optional<double> chance = chance_beyond_references(d, c);
+    if (chance && *chance < least) {
+      least = *chance;
       found = c;
     }
   }

@@ -39,8 +39,8 @@ double reference_rms(const Diagnosis& d, std::size_t channel);
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel);
 /// Whether that is significant; true where there is nothing to compare with.
 bool exceeds_references(const Diagnosis& d, std::size_t channel);
-/// The channel in which it is most significant, among those whose residual, in the whole log or in its largest stretch of motion, is
-/// a multiple of that in the references; nothing where it is in none, or without references.
+/// The channel in which it is most significant, among those whose residual is a multiple of that in the references; nothing where it
+/// is in none, or without references.
 std::optional<std::size_t> channel_beyond_references(const Diagnosis& d);
 
 /// Structure in the suspect logs' final residual beside that of the references.

@@ -208,6 +208,9 @@ struct BadDataOptions {
   /// Number of such steps in a row that make a ramp.
   /// @threshold [steps] 2..10; chosen: a jump has one step, a chamber that fills has several
   int ramp_steps = 3;
+  /// Largest share of a step that the mean of the steps on either side of it makes up.
+  /// @threshold [1] 0..1; chosen: as jump_alike_share, the signal itself may move on by so much
+  double local_slope_share = 0.35;
   /// Longest loss of contact of a pump pressure's sensor while a lever moves.
   /// @threshold [s] 0.05..5; chosen: changes of a pump pressure that a lever causes last longer
   double contact_s = 0.5;

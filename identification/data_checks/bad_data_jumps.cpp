@@ -98,6 +98,15 @@ bool is_on_a_ramp(const VectorXd& x, const SampleRange& run, Index k,
   return false;
 }
 
+/// @return whether a step is the steepest part of a signal that moves by itself, as a pump that hunts does within a few samples
+bool is_part_of_a_slope(const VectorXd& x, const SampleRange& run, Index k,
+                        const BadDataOptions& options) {
+  const auto step = [&](Index i) {
+    return i >= run.begin && i + 1 < run.end ? x[i + 1] - x[i] : 0.0;
+  };
+  return 0.5 * (step(k - 1) + step(k + 1)) / step(k) > options.local_slope_share;
+}
+
 /// @return steps between two samples that are large for the channel and that no other channel explains
 std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t channel) {
   const CheckedChannel& c = context.channels[channel];
@@ -115,7 +124,8 @@ std::vector<Step> unexplained_steps(const CheckContext& context, std::size_t cha
               (context.log.time[k + 1] - context.log.time[k]);
       if (!(std::abs(size) > limit)) continue;
       // No load or valve moves a joint that far within a sample, so other channels cannot explain steps of positions.
-      if (!position && (is_on_a_ramp(x, run, k, context.options) || others.explain(k, size)))
+      if (!position && (is_on_a_ramp(x, run, k, context.options) ||
+                        is_part_of_a_slope(x, run, k, context.options) || others.explain(k, size)))
         continue;
       out.push_back({k, size});
     }

@@ -101,14 +101,17 @@ TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) {
   EXPECT_EQ(beside(1.5, 0.0), BesideReferences::kMore);
 }
 
-/// A pump that hunts in one motion: the RMS of the log is not twice that of the references.
+/// A pump that hunts in one motion, by so much that the RMS of the log is more than twice that of the references; less is none.
 TEST(ResidualLevels, OneStretchOfMotionIsComparedWithTheLargestOfTheReferences) {
-  const Diagnosis d = with_loud_stretch(6.0, 1.0);
-  const std::size_t jib = jib_force(d);
-  EXPECT_LT(suspect_rms(d.evidence, jib, d.search.final.residual[jib]),
-            d.thresholds.least_excess_ratio * reference_rms(d, jib));
-  EXPECT_EQ(channel_beyond_references(d), jib);
-  EXPECT_EQ(channel_beyond_references(with_loud_stretch(6.0, 6.0)), std::nullopt);
+  for (const double loud : {6.0, 40.0}) {
+    const Diagnosis d = with_loud_stretch(loud, 1.0);
+    const std::size_t jib = jib_force(d);
+    const bool twice = suspect_rms(d.evidence, jib, d.search.final.residual[jib]) >
+                       d.thresholds.least_excess_ratio * reference_rms(d, jib);
+    EXPECT_EQ(twice, loud > 6.0);
+    EXPECT_EQ(channel_beyond_references(d), twice ? std::optional(jib) : std::nullopt);
+  }
+  EXPECT_EQ(channel_beyond_references(with_loud_stretch(40.0, 40.0)), std::nullopt);
   EXPECT_EQ(channel_beyond_references(with_loud_stretch(1.0, 1.0)), std::nullopt);
 }
 

@@ -161,6 +161,25 @@ TEST(BadData, AChamberThatFillsIsNoJump) {
   EXPECT_THAT(names(bad_of(arm_machine(), log)), IsEmpty());
 }
 
+/// Two steep samples of a smooth swing, up at first and down 0.4 s later, look like a level that jumps away and comes back.
+TEST(BadData, APumpThatHuntsIsNoJump) {
+  for (const bool smooth : {true, false}) {
+    Log log = noisy_arm();
+    Eigen::VectorXd& p = channel(log, "p_main").values;
+    const Eigen::Index first = 1400, last = 1420;
+    const double flank[] = {4.0, 10.0, 18.0, 7.0, 5.0};  // [bar] from sample to sample
+    for (Eigen::Index k = first - 2; k <= last + 2; ++k)
+      for (Eigen::Index i = -2; i <= 2; ++i) {
+        if (!smooth && i != 0) continue;
+        if (k >= first + i) p[k] += flank[i + 2] * kBar;
+        if (k >= last + i) p[k] -= flank[i + 2] * kBar;
+      }
+    EXPECT_THAT(names(bad_of(arm_machine(), log)),
+                smooth ? testing::Matcher<std::vector<std::string>>(IsEmpty())
+                       : testing::Matcher<std::vector<std::string>>(ElementsAre("p_main jumping")));
+  }
+}
+
 TEST(BadData, APumpThatFollowsAMovingLeverIsNoJump) {
   Log log = noisy_arm();
   for (const Eigen::Index k : {700, 1300, 2200})  // for 2 s, as when a valve leaves its dead band
