@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "diagnosis/experiment/experiment.h"
+#include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
