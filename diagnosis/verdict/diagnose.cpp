@@ -10,6 +10,7 @@
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/selection/effect_estimate.h"
+#include "diagnosis/selection/search_state.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/reference_comparison.h"
 #include "diagnosis/verdict/residual_levels.h"
@@ -145,6 +146,13 @@ void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signal
                             {},
                             effects_in_references(model, signals.references)},
                            {}, options);
+    if (tracing())
+      for (std::size_t k = 0; k < found.size(); ++k)
+        fmt::print(stderr, "  together {}: {:.4g}, 95 % from {:.4g} to {:.4g}{}\n",
+                   effect_key(wanted[k].effect->info(), model.machine, wanted[k].at),
+                   fmt::join(all.effects[k].values, " "), fmt::join(all.effects[k].lower95, " "),
+                   fmt::join(all.effects[k].upper95, " "),
+                   all.significant[k] ? "" : ", not significant");
     std::ptrdiff_t at = std::ssize(found) - 1;
     std::string why;
     for (; at >= 0; --at) {
