@@ -172,6 +172,7 @@ enum class Proof {
 struct SizeVerdict {
   InReferences in_references = InReferences::kAlike;
   Proof proof = Proof::kClearExcess;
+  double chance = 1.0;  ///< of sizes that differ so far; 1 where they are not compared
 };
 
 /// Share of the squared residual of a channel in the suspect logs beyond that in the references that goes when a residual
@@ -372,7 +373,8 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
             taken_over              ? Proof::kClearExcess
             : certain(sizes.mean()) ? Proof::kNone
-                                    : Proof::kExcess};
+                                    : Proof::kExcess,
+            chance(sizes.mean())};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -405,7 +407,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
-      certain(difference) ? Proof::kNone : Proof::kExcess};
+      certain(difference) ? Proof::kNone : Proof::kExcess, chance(difference)};
 }
 
 /// Whether an effect found as a difference acts in a channel, or something there stays unexplained.
@@ -472,7 +474,10 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
       is_shared(d.evidence, d.search.found[found]) || compared.in_references == InReferences::kNot
           ? InReferences::kVaries
           : InReferences::kAlike;
-  if (!predicts_left_out(d, d.search.found[found], options)) return no_change;
+  // what the residuals of all channels must prove is not proven by its size
+  const bool by_size = compared.proof != Proof::kClearExcess &&
+                       !(compared.chance < d.thresholds.difference_beyond_doubt);
+  if (by_size && !predicts_left_out(d, d.search.found[found], options)) return no_change;
   if (tracing() && compared.proof == Proof::kNone) needed(d, found, Proof::kExcess);
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is

@@ -23,22 +23,19 @@ using Eigen::VectorXd;
 struct BlockLevel {
   double mean = 0.0, variance_of_mean = 0.0, largest = 0.0;
   int blocks = 0;
-  std::vector<double> levels;
-  std::vector<Index> rows;  ///< of each
 };
 
 BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
   const EvidenceChannel& c = d.evidence.channels[channel];
   const VectorXd residual = settled(d, channel, d.search.final.residual[channel]);
   BlockLevel level;
-  std::vector<double>& levels = level.levels;
+  std::vector<double> levels;
   for (std::size_t b = 0; b < c.blocks.size(); ++b) {
     if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
     const Index length = c.blocks[b].last - c.blocks[b].first;
     const double square = residual.segment(c.blocks[b].first, length).squaredNorm();
     levels.push_back(std::log(
         std::max(square / static_cast<double>(length), std::numeric_limits<double>::min())));
-    level.rows.push_back(length);
   }
   level.blocks = static_cast<int>(levels.size());
   if (levels.size() < 2) return level;
@@ -60,34 +57,16 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
   return student_tail((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
 }
 
-/// Variance of the logarithm of a mean square over rows of white noise: the trigamma function of half their number (Abramowitz
-/// and Stegun 1964, 6.4.3, 6.4.4 and 6.4.6).
-double variance_of_log(Index rows) {
-  const bool odd = rows % 2 == 1;
-  double x = odd ? 0.5 : 1.0;
-  double variance = std::numbers::pi * std::numbers::pi * (odd ? 0.5 : 1.0 / 6.0);
-  for (; x < 0.5 * static_cast<double>(rows); x += 1.0) variance -= 1.0 / (x * x);
-  return variance;
-}
-
-/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike, by
-/// Bonferroni's bound over the suspect blocks. A deviation in one stretch of motion hardly moves the mean level. Levels have heavier
-/// tails than normal deviates: by Laplace's distribution, whose variance is that between the references' blocks and what a
-/// block of so few rows has by itself (DerSimonian and Laird 1986, Control. Clin. Trials 7, 177). Where the references have
-/// nearly as large a one, it is no difference.
+/// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
+/// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
+/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
+/// no difference.
 /// @param excess ratio of the RMS
 double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
+  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
   const double n = reference.blocks;
-  double within = 0.0;
-  for (const Index rows : reference.rows) within += variance_of_log(rows) / n;
-  const double between = std::max(0.0, reference.variance_of_mean * n - within);
-  double most = 0.0;
-  for (std::size_t b = 0; b < suspect.levels.size(); ++b) {
-    if (suspect.levels[b] < reference.largest + 2.0 * std::log(excess)) continue;
-    const double variance = between + variance_of_log(suspect.rows[b]) + reference.variance_of_mean;
-    most = std::max(most, (suspect.levels[b] - reference.mean) / std::sqrt(variance));
-  }
-  return most > 0.0 ? suspect.blocks * 0.5 * std::exp(-std::numbers::sqrt2 * most) : 1.0;
+  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
+  return suspect.blocks * student_tail((suspect.largest - reference.mean) / deviation, n - 1.0);
 }
 
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and

@@ -11,10 +11,8 @@ namespace sparflow {
 
 /// Probabilities by chance that the residual of a channel in the suspect logs exceeds that in the references so far.
 struct Excess {
-  double level = 1.0;  ///< in the mean over the blocks
-  /// In the largest block, by Laplace's distribution of the logarithms: Student's prediction of one further block is too bold in the
-  /// tail (8e-7, 3e-4 and 1e-3 of three pump pressures among 247 channels of simulated machines without a change).
-  double largest = 1.0;
+  double level = 1.0;    ///< in the mean over the blocks
+  double largest = 1.0;  ///< in the largest block, by Student's prediction of one further block
 };
 inline constexpr double kWaysToExceed = 2.0;  ///< level and a block, for Bonferroni's bound
 

@@ -141,7 +141,6 @@ TEST(ResidualModel, AnOscillationThatTheReferencesHaveLessRegularlyIsNoChange) {
   const std::size_t c = left.channel(EvidenceKind::kPump, 0);
   EvidenceChannel& channel = left.evidence.channels[c];
   ASSERT_EQ(channel.raw.size(), 2U);
-  channel.noise_floor = 1.0e5;  // nearly all of the filtered residual, so that this says nothing
   const double step = left.evidence.series[0].step;
   const VectorXd quiet = channel.raw[1];
   oscillate(channel.raw[0], step, 1.0, random);
@@ -160,6 +159,12 @@ TEST(ResidualModel, AnOscillationThatTheReferencesHaveLessRegularlyIsNoChange) {
   const std::vector<ResidualStructure> found = find_residual_structure(d.evidence, left.fit);
   ASSERT_FALSE(found.empty());
   ASSERT_TRUE(found[0].channel == c && found[0].oscillation);
+  // the references' filtered residual is noise, the other one a little more, so that it says nothing
+  d.evidence.channels[c].noise_floor = reference_rms(d, c);
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b)
+    if (channel.log[b] == 0)
+      d.search.final.residual[c].segment(channel.blocks[b].first,
+                                         channel.blocks[b].last - channel.blocks[b].first) *= 1.05;
   EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kShared);
   d.evidence.channels[c].raw[1] = quiet;
   EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kMore);

@@ -145,19 +145,21 @@ TEST(ReferenceComparison, ValuesWithinTheIntervalsOfTheReferencesAreAlike) {
     EvidenceOptions options;
     options.shared = {{lag,
                        0,
-                       {1.0, 0.30, 0.0, 0.0, 0.0, 0.0},
-                       {0.9, 0.30 - half, 0.0, 0.0, 0.0, 0.0},
-                       {1.1, 0.30 + half, 0.0, 0.0, 0.0, 0.0}}};
+                       {1.0, 0.30, 0.0, 0.0, 0.0, 0.0, 0.0},
+                       {0.9, 0.30 - half, 0.0, 0.0, 0.0, 0.0, 0.0},
+                       {1.1, 0.30 + half, 0.0, 0.0, 0.0, 0.0, 0.0}}};
     Diagnosis d;
     d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
                                   {make_signals(loader(), logs.reference)}, nullptr, options);
     const auto at = d.evidence.find(EvidenceKind::kPump, 0) - d.evidence.channels.data();
     EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
     FoundEffect found;
-    found.design = make_design(d.evidence, {lag, 0}, {0.36, form, 0.0, 0.0, 0.0});
-    found.values = {1.0, 0.36, form, 0.0, 0.0, 0.0};
-    found.lower95 = {0.9, 0.36 - half, form, 0.0, 0.0, 0.0};
-    found.upper95 = {1.1, 0.36 + half, form, 0.0, 0.0, 0.0};
+    found.design = make_design(d.evidence, {lag, 0}, {0.36, form, 0.0, 0.0, 0.0, 0.0});
+    found.values = {1.0, 0.36, form, 0.0, 0.0, 0.0, 0.0};
+    found.lower95 = {0.9, 0.36 - half, form, 0.0, 0.0, 0.0, 0.0};
+    found.upper95 = {1.1, 0.36 + half, form, 0.0, 0.0, 0.0, 0.0};
+    found.held_out = 100.0;  // [nats]
+    found.held_out_error = 1.0;
     std::mt19937_64 random(2);
     NoiseModel noise;
     noise.variance = 1e5 * 1e5;  // [Pa^2]
