@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
