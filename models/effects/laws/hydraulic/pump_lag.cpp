@@ -47,10 +47,7 @@ class PumpLag final : public Effect {
     if (measured.kind != EvidenceKind::kPump || measured.index != at) return false;
     const Eigen::VectorXd& demand = log.pumps[static_cast<std::size_t>(at)].demand;
     if (demand.size() == 0) return false;
-    if (is_late(shape) && log.pumps[static_cast<std::size_t>(at)].asked.rows() == 0) return false;
-    const bool balance = form_of(shape) == Form::kFlowBalance;
-    if (balance != (shape.size() > kCapacity && shape[kCapacity] > 0.0)) return false;
-    if (balance && !(is_late(shape) && chambers_known(log, at))) return false;
+    if (!is_complete(log, at, shape)) return false;
     columns = late(log, at, Eigen::VectorXd(), shape) - demand;
     return true;
   }
@@ -60,6 +57,7 @@ class PumpLag final : public Effect {
                                   const Eigen::VectorXd& change) const override {
     if (pump != at || log.pumps[static_cast<std::size_t>(pump)].demand.size() == 0) return {};
     const std::span<const double> shape = p.subspan(1);
+    if (!is_complete(log, at, shape)) return {};
     const Eigen::VectorXd late_change =
         late(log, at, change, shape) - late(log, at, Eigen::VectorXd(), shape);
     return (1.0 - p[0]) * change + p[0] * late_change;
@@ -166,6 +164,13 @@ class PumpLag final : public Effect {
   }
   static Form form_of(std::span<const double> shape) {
     return static_cast<Form>(std::lround(shape[kForm]));
+  }
+  /// Whether the variant has its parameters, and the log what it needs.
+  static bool is_complete(const MachineSeries& log, int at, std::span<const double> shape) {
+    const bool balance = form_of(shape) == Form::kFlowBalance;
+    if (balance != (shape.size() > kCapacity && shape[kCapacity] > 0.0)) return false;
+    if (is_late(shape) && log.pumps[static_cast<std::size_t>(at)].asked.rows() == 0) return false;
+    return !balance || (is_late(shape) && chambers_known(log, at));
   }
   static bool chambers_known(const MachineSeries& log, int at) {
     const std::vector<int>& feeds = log.pumps[static_cast<std::size_t>(at)].feeds;

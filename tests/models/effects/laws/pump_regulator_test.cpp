@@ -183,6 +183,8 @@ TEST_F(PumpRegulatorTest, ThePumpLagActsOnlyWithTheParametersOfItsVariant) {
   EXPECT_FALSE(acts({0.2, 4.0, 0.4, 0.1, 0.1, 1e-11}));
   log.cylinders[1].pressure_b.resize(0);
   EXPECT_FALSE(acts({0.2, 5.0, 0.4, 0.1, 0.1, 1e-11})) << "a chamber is not measured";
+  const std::vector<double> whole = {1.0, 0.2, 5.0, 0.4, 0.1, 0.1, 1e-11};
+  EXPECT_EQ(effect_named("pump_lag").followed_demand(log, 0, 0, whole, pump.demand).size(), 0);
 }
 
 }  // namespace
