@@ -478,7 +478,6 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
   const bool by_size = compared.proof != Proof::kClearExcess &&
                        !(compared.chance < d.thresholds.difference_beyond_doubt);
   if (by_size && !predicts_left_out(d, d.search.found[found], options)) return no_change;
-  if (tracing() && compared.proof == Proof::kNone) needed(d, found, Proof::kExcess);
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.
