@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <stdexcept>
 
 #include "diagnosis/regression/effect_fit.h"
 
@@ -96,6 +97,8 @@ EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
     d.lower.push_back(p.lower);
     d.upper.push_back(p.upper);
   }
+  if (d.shape.size() + d.lower.size() != effect.effect->info().parameters.size())
+    throw std::invalid_argument("An effect's design needs a value of each nonlinear parameter.");
   for (const EvidenceChannel& c : evidence.channels)
     d.columns.push_back(evidence.columns(effect, d.shape, c, about));
   drop_negligible(evidence, d);

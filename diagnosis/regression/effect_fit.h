@@ -29,7 +29,7 @@ struct EffectDesign {
 };
 
 /// A linear parameter whose action is negligible (EvidenceOptions::negligible_action) gets columns of zeros.
-/// @param shape nonlinear parameters [SI]  @param about see Evidence::columns
+/// @param shape nonlinear parameters [SI], each of them; std::invalid_argument otherwise  @param about see Evidence::columns
 /// @param optional whether the optional parameters get columns
 EffectDesign make_design(const Evidence& evidence, const EffectAt& effect,
                          std::vector<double> shape, std::span<const double> about = {},

@@ -33,7 +33,7 @@ struct Hunting {
     NoiseModel noise;
     noise.variance = 1e5 * 1e5;  // [Pa^2]
     const auto action = [&](double form) {
-      return make_design(evidence, {lag, 0}, {0.34, form, 0.0, 0.0, 0.0})
+      return make_design(evidence, {lag, 0}, {0.34, form, 0.0, 0.0, 0.0, 0.0})
           .columns[static_cast<std::size_t>(at)]
           .col(0)
           .eval();
@@ -44,7 +44,7 @@ struct Hunting {
 
   /// The share of the lag of a form, alone.
   double share_of(double form) const {
-    const EffectDesign design = make_design(evidence, {lag, 0}, {0.34, form, 0.0, 0.0, 0.0});
+    const EffectDesign design = make_design(evidence, {lag, 0}, {0.34, form, 0.0, 0.0, 0.0, 0.0});
     return fit_effects(evidence, {&design}, nullptr, {}).theta[0];
   }
   /// The nonlinear parameters of the lag after the move, which begins with that of first order.
@@ -53,7 +53,7 @@ struct Hunting {
     const SearchProgress progress;
     const SearchState search(evidence, {{lag, 0}}, options, progress);
     std::vector<FoundEffect> found(1);
-    found[0].design = make_design(evidence, {lag, 0}, {0.34, 0.0, 0.0, 0.0, 0.0});
+    found[0].design = make_design(evidence, {lag, 0}, {0.34, 0.0, 0.0, 0.0, 0.0, 0.0});
     EffectFit current = search.fit(designs_of(found));
     reshape(search, found, 0, current);
     return found[0].design.shape;
