@@ -169,6 +169,14 @@ class Effect {
     return {};
   }
 
+  /// What a pump's pressure loses when the pump delivers no more than `limit` [m^3/s], beside this law [samples, Pa, <= 0 as a rule];
+  /// empty: the law knows no flow.
+  virtual Eigen::VectorXd lost_at_flow_limit(const MachineSeries& /*log*/, int /*pump*/, int /*at*/,
+                                             std::span<const double> /*p*/,
+                                             double /*limit*/) const {
+    return {};
+  }
+
   /// Whether a variant of the law is only told against a reference log: a part of the model that is learned from the same log may
   /// have the same signature.
   /// The argument has the nonlinear parameters [SI].

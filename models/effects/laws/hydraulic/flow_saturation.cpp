@@ -52,13 +52,14 @@ class FlowSaturation final : public Effect {
               "-",
               1.0,
               0.0,
-              2.0,
+              3.0,
               0.0,
               "0: hard limit, flow shared in proportion; 1: the same with a smooth limit "
               "(power law of exponent 12); 2: hard limit, not shared: the highest load gets "
-              "what the others leave",
+              "what the others leave; 3: hard limit in the flow balance of the pump's line (of "
+              "pump_lag, where a model has that), in starts and stops as well",
               false,
-              {0.0, 1.0, 2.0},
+              {0.0, 1.0, 2.0, 3.0},
               true}},
         .equation =
             "Q_i = s Q_i(u), s = min(1, limit / sum of Q(u)), soft: (1 + (sum / "
@@ -91,9 +92,7 @@ class FlowSaturation final : public Effect {
   }
 
   std::vector<double> grid(const MachineSeries& log, int at, int shape_index) const override {
-    if (shape_index == 1)
-      return loads_known(log, at) ? std::vector<double>{0.0, 1.0, 2.0}
-                                  : std::vector<double>{0.0, 1.0};
+    if (shape_index == 1) return forms_known(log, at);
     const Demand demand(log, at, std::numeric_limits<double>::infinity(), Form::kShared);
     if (!demand.known || !(demand.largest > 0.0)) return {};
     std::vector<double> limits;
@@ -110,11 +109,14 @@ class FlowSaturation final : public Effect {
              : measured.kind != EvidenceKind::kFlow ||
                    log.machine->pump_of_cylinder(measured.index) != at)
       return false;
-    const Demand demand(
-        log, at, shape[0],
-        shape.size() > 1 ? static_cast<Form>(std::lround(shape[1])) : Form::kShared);
-    if (!demand.known) return false;
+    const Form form = shape.size() > 1 ? static_cast<Form>(std::lround(shape[1])) : Form::kShared;
+    const Demand demand(log, at, shape[0], form);
+    if (!demand.known || (form == Form::kByLine && !has_line(log, at))) return false;
     columns.setZero(log.samples(), 2);
+    if (pump && form == Form::kByLine) {
+      columns.col(0) = lost_by_line(log, at, shape[0]);
+      return !columns.isZero(0.0);
+    }
     if (pump && demand.lost.size() > 0) {
       columns.col(0) = -demand.lost;
       return true;
@@ -135,11 +137,28 @@ class FlowSaturation final : public Effect {
   }
 
  private:
-  enum class Form { kShared, kSoft, kUnshared };
+  enum class Form { kShared, kSoft, kUnshared, kByLine };
 
   /// Whether the model computes the flow of a cylinder from the measured pump pressure, in which the lack of flow shows already.
   static bool by_pressure_drop(const MachineSeries& log, int cylinder) {
     return log.cylinders[static_cast<std::size_t>(cylinder)].passed.size() > 0;
+  }
+
+  /// What the limit costs by the law that the pump's pressure follows, if that knows the flow; empty otherwise. [samples, Pa]
+  static Eigen::VectorXd lost_by_line(const MachineSeries& log, int pump, double limit) {
+    const LawOfModel& law = log.pumps[static_cast<std::size_t>(pump)].following;
+    if (law.effect == nullptr) return {};
+    return law.effect->lost_at_flow_limit(log, pump, law.at, law.values, limit);
+  }
+  static bool has_line(const MachineSeries& log, int pump) {
+    return lost_by_line(log, pump, std::numeric_limits<double>::infinity()).size() > 0;
+  }
+  /// Forms whose data the log has. [as the parameter]
+  static std::vector<double> forms_known(const MachineSeries& log, int pump) {
+    std::vector<double> forms = {0.0, 1.0};
+    if (loads_known(log, pump)) forms.push_back(2.0);
+    if (has_line(log, pump)) forms.push_back(3.0);
+    return forms;
   }
 
   /// Whether the log says which pressure each section asks for and has at its load.
@@ -173,7 +192,8 @@ class FlowSaturation final : public Effect {
         known = known && log.cylinders[static_cast<std::size_t>(i)].command.size() > 0 &&
                 machine.cylinders[static_cast<std::size_t>(i)].hydraulic();
       }
-      known = known && (form != Form::kUnshared || loads_known(log, pump));
+      const bool by_load = form == Form::kUnshared || form == Form::kByLine;
+      known = known && (!by_load || loads_known(log, pump));
       if (!known) return;
       /// Rounds in which flows and supply are brought into agreement.
       /// @threshold [1] 1..100; chosen: the served share changes little from round to round
@@ -207,7 +227,7 @@ class FlowSaturation final : public Effect {
           of_all = (1.0 + (total.array() / limit).pow(kExponent)).pow(-1.0 / kExponent);
         else
           of_all = (limit / total.array()).min(1.0);
-        if (form == Form::kUnshared) {
+        if (by_load) {
           serve_by_load(log, pump, asked, limit);
           continue;
         }

@@ -63,6 +63,21 @@ class PumpLag final : public Effect {
     return (1.0 - p[0]) * change + p[0] * late_change;
   }
 
+  Eigen::VectorXd lost_at_flow_limit(const MachineSeries& log, int pump, int at,
+                                     std::span<const double> p, double limit) const override {
+    const std::span<const double> shape = p.subspan(1);
+    if (pump != at || log.pumps[static_cast<std::size_t>(pump)].demand.size() == 0 ||
+        form_of(shape) != Form::kFlowBalance || !is_complete(log, at, shape))
+      return {};
+    const PumpSeries& series = log.pumps[static_cast<std::size_t>(pump)];
+    const std::vector<OpenSection> open = sections(log, series, Eigen::VectorXd(), shape);
+    const auto pressure = [&](double most) {
+      return regulated_pressure(log, series.standby, open,
+                                {shape[kTau], shape[kCapacity], shape[kRest], most}, series.demand);
+    };
+    return p[0] * (pressure(limit) - pressure(std::numeric_limits<double>::infinity()));
+  }
+
  private:
   static std::vector<EffectParameter> parameters() {
     return {{"share",
@@ -193,8 +208,10 @@ class PumpLag final : public Effect {
     const PumpSeries& pump = log.pumps[static_cast<std::size_t>(at)];
     const Form form = form_of(shape);
     if (form == Form::kFlowBalance)
-      return regulated_pressure(log, pump.standby, sections(log, pump, change, shape),
-                                {shape[kTau], shape[kCapacity], shape[kRest]}, pump.demand);
+      return regulated_pressure(
+          log, pump.standby, sections(log, pump, change, shape),
+          {shape[kTau], shape[kCapacity], shape[kRest], std::numeric_limits<double>::infinity()},
+          pump.demand);
     if (!is_late(shape))
       return followed(log, pump,
                       change.size() > 0 ? Eigen::VectorXd(pump.demand + change) : pump.demand,

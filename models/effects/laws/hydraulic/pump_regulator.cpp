@@ -64,11 +64,14 @@ class Line {
       if (std::abs(here) * dt < kSolved) break;
     }
     const double e = error(open, p), asked = integral_ + 2.0 * kDamping * e / r_.tau;
-    integral_ += dt * (e / (r_.tau * r_.tau) + (std::max(0.0, asked) - asked) / r_.tau);
+    integral_ += dt * (e / (r_.tau * r_.tau) + (held(asked) - asked) / r_.tau);
     return pressure_ = p;
   }
 
  private:
+  /// [Pa/s] of what the regulator asks for, what the pump delivers
+  double held(double asked) const { return std::clamp(asked, 0.0, r_.most_flow / r_.capacity); }
+
   /// A closed check valve lets the line sense no more than its own pressure.
   double error(const std::vector<Section>& open, double p) const {
     double set = standby_;
@@ -79,7 +82,7 @@ class Line {
   /// [Pa/s] by which a pressure at the end of the step is too high.
   double excess(const std::vector<Section>& open, double dt, double p) const {
     double out = (p - pressure_) / dt + p / r_.rest -
-                 std::max(0.0, integral_ + 2.0 * kDamping * error(open, p) / r_.tau);
+                 held(integral_ + 2.0 * kDamping * error(open, p) / r_.tau);
     for (const Section& s : open) out += s.rate * passed_share(p - s.load, s.margin);
     return out;
   }
