@@ -103,7 +103,7 @@ VectorXd by_small_steps(const MachineSeries& log, const std::vector<OpenSection>
           taken += s.flow[k] / r.capacity * std::sqrt(std::min(1.0, drop));
         }
         const double e = set - p, asked = y + 2.0 * kDamping * e / r.tau,
-                     held = std::max(0.0, asked);
+                     held = std::clamp(asked, 0.0, r.most_flow / r.capacity);
         p += (held - taken - p / r.rest) * h;
         y += (e / (r.tau * r.tau) + (held - asked) / r.tau) * h;
       }
@@ -126,12 +126,34 @@ TEST_F(PumpRegulatorTest, ItDoesNotWindUpWhileItsPressureIsTooHigh) {
   for (const Index k : {120, 150, 180}) EXPECT_NEAR(p[k], exact[k], 0.02 * kMargin) << k;
 }
 
-// The second path for the sections as the pump's lag makes them from the log: a valve is open where its lever was beyond `opening`
-// five samples ago, at the pressure of that side's chamber, with the margin that its lever asked for last there.
-TEST_F(PumpRegulatorTest, ThePumpLagOfTheFlowBalanceFollowsItsDifferentialEquations) {
-  constexpr Index kLate = 5;
-  const double opening = 0.15;
+// An edge passes the root of its pressure drop, so that a pump of 0.6 of the flow keeps 0.36 of the drop.
+TEST_F(PumpRegulatorTest, APumpAtItsLargestFlowKeepsTheDropThatPassesIt) {
+  PumpRegulator r{0.1, 1e-11, 1e9};
+  r.most_flow = 3e-4;
+  const VectorXd p = regulated_pressure(log, kStandby, {section(80 * kBar, 5e-4)}, r, start);
+  EXPECT_NEAR(p[1199], 80 * kBar + 0.36 * kDropOverMargin * kMargin, 1e-3 * kBar);
+  // the flow that lacks once the load rises is no flow that the regulator has asked for meanwhile
+  OpenSection falls = section(80 * kBar, 5e-4);
+  falls.flow.tail(1000).setConstant(1e-4);
+  log.runs = {{0, 300}};
+  const VectorXd exact = by_small_steps(log, {falls}, r, start);
+  const VectorXd fallen = regulated_pressure(log, kStandby, {falls}, r, start);
+  for (const Index k : {220, 250, 280}) EXPECT_NEAR(fallen[k], exact[k], 0.02 * kMargin) << k;
+}
+
+class PumpLineTest : public PumpRegulatorTest {
+ protected:
+  static constexpr Index kLate = 5;
+  static constexpr double kOpening = 0.15;
   const PumpRegulator r{0.3, 2e-11, 0.5};
+  const std::vector<double> shape = {r.tau, 5.0, r.rest, kLate* log.step, kOpening, r.capacity};
+
+  std::vector<OpenSection> valves();
+};
+
+/// The sections as the pump's lag should make them from the log: a valve is open where its lever was beyond `opening` five samples
+/// ago, at the pressure of that side's chamber, with the margin that its lever asked for last there.
+std::vector<OpenSection> PumpLineTest::valves() {
   PumpSeries& pump = log.pumps[0];
   pump.standby = kStandby;
   pump.feeds = {0, 1};
@@ -148,8 +170,8 @@ TEST_F(PumpRegulatorTest, ThePumpLagOfTheFlowBalanceFollowsItsDifferentialEquati
         if (c.direction[k] != 0)
           pump.asked(k, i) = (c.direction[k] > 0 ? c.pressure_a : c.pressure_b)[k] + kMargin;
         const double valve = c.command[std::max(first, k - kLate)];
-        if (std::abs(valve) <= opening) continue;
-        const double side = valve > 0.0 ? 1.0 : -1.0, beyond = std::abs(valve) - opening;
+        if (std::abs(valve) <= kOpening) continue;
+        const double side = valve > 0.0 ? 1.0 : -1.0, beyond = std::abs(valve) - kOpening;
         s.load[k] = (side > 0.0 ? c.pressure_a : c.pressure_b)[k];
         const double speed = gain[side > 0.0 ? 1 : 0] * beyond;
         s.flow[k] = speed * (side > 0.0 ? cylinder.area_piston() : cylinder.area_rod());
@@ -159,12 +181,45 @@ TEST_F(PumpRegulatorTest, ThePumpLagOfTheFlowBalanceFollowsItsDifferentialEquati
       }
     }
   }
-  const std::vector<double> shape = {r.tau, 5.0, r.rest, kLate * log.step, opening, r.capacity};
+  return sections;
+}
+
+TEST_F(PumpLineTest, ThePumpLagOfTheFlowBalanceFollowsItsDifferentialEquations) {
+  const std::vector<OpenSection> sections = valves();
   MatrixXd c;
   ASSERT_TRUE(effect_named("pump_lag").columns(log, {EvidenceKind::kPump, 0}, 0, shape, c));
-  const VectorXd exact = by_small_steps(log, sections, r, pump.demand) - pump.demand;
+  const VectorXd& demand = log.pumps[0].demand;
+  const VectorXd exact = by_small_steps(log, sections, r, demand) - demand;
   // the implicit step of first order has an error of about h / tau
   EXPECT_LT((c.col(0) - exact).norm(), log.step / r.tau * exact.norm());
+}
+
+// What a limit costs by the law that the model has of the pump's line, in proportion to that law's share.
+TEST_F(PumpLineTest, AFlowLimitCostsWhatTheBalanceWithItLacks) {
+  const std::vector<OpenSection> sections = valves();
+  const double share = 1.1;
+  std::vector<double> values = {share};
+  values.insert(values.end(), shape.begin(), shape.end());
+  PumpSeries& pump = log.pumps[0];
+  PumpRegulator limited = r;
+  double largest = 0.0;
+  for (Index k = 0; k < log.samples(); ++k)
+    largest = std::max(largest, sections[0].flow[k] + sections[1].flow[k]);
+  limited.most_flow = 0.5 * largest;
+  MatrixXd c;
+  const auto acts = [&](double limit) {
+    const std::vector<double> by_line = {limit, 3.0};
+    return effect_named("flow_saturation").columns(log, {EvidenceKind::kPump, 0}, 0, by_line, c);
+  };
+  EXPECT_FALSE(acts(limited.most_flow)) << "the model has no law of the line";
+  pump.following = {&effect_named("pump_lag"), 0, values};
+  ASSERT_TRUE(acts(limited.most_flow));
+  const VectorXd exact = share * (by_small_steps(log, sections, limited, pump.demand) -
+                                  by_small_steps(log, sections, r, pump.demand));
+  ASSERT_LT(exact.minCoeff(), -0.2 * kMargin);
+  EXPECT_LT((c.col(0) - exact).norm(), log.step / r.tau * exact.norm());
+  EXPECT_TRUE(c.col(1).isZero(0.0));
+  EXPECT_FALSE(acts(10.0 * largest)) << "the limit is never reached";
 }
 
 // No variant without its parameters: the flow balance needs capacity and late valves, and no other variant has a capacity.
