@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "models/math/linear_algebra.h"
+#include "models/math/student.h"
 
 namespace sparflow {
 namespace {
@@ -135,6 +136,26 @@ bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>
   return false;
 }
 
+namespace {
+/// One-sided chance of a mean so far above zero.
+double chance_of_gains(const std::vector<double>& gains) {
+  const auto count = static_cast<double>(gains.size());
+  if (gains.size() < 2) return 1.0;
+  double mean = 0.0, squares = 0.0;
+  for (const double v : gains) mean += v / count;
+  for (const double v : gains) squares += (v - mean) * (v - mean);
+  const double error = std::sqrt(squares / (count * (count - 1.0)));
+  return student_tail(mean / std::max(error, 1e-300), count - 1.0);
+}
+
+/// A stretch of motion in which an effect acts.
+struct Stretch {
+  std::size_t fold, channel;
+  MatrixXd
+      cross;  ///< of the designs that touch the channel, with each other and with the measured values
+};
+}  // namespace
+
 HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                           std::size_t index, const EffectFit& fit, int folds) {
   const Layout layout(designs);
@@ -145,6 +166,7 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   std::vector<MatrixXd> n(count, MatrixXd::Zero(layout.count, layout.count));
   std::vector<VectorXd> g(count, VectorXd::Zero(layout.count));
   std::vector<bool> used(channels, false);
+  std::vector<Stretch> stretches;
   for (std::size_t c = 0; c < channels; ++c) {
     const MatrixXd columns = columns_of(designs, c, evidence.channels[c].rows());
     const Index width = columns.cols();
@@ -160,6 +182,9 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
       const NoiseBlock& block = evidence.channels[c].blocks[b];
       const MatrixXd part = rows[c].middleRows(block.first, block.last - block.first);
       const MatrixXd cross = transposed_product(part.leftCols(width), part);
+      if (designs[index]->touches(c) &&
+          !designs[index]->columns[c].middleRows(block.first, block.last - block.first).isZero(0.0))
+        stretches.push_back({b % count, c, cross});
       for (Index i = 0; i < width; ++i) {
         const Index oi = owner[c][static_cast<std::size_t>(i)];
         g[b % count][oi] += cross(i, width);
@@ -179,7 +204,7 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
       others.push_back(i);
   }
-  std::vector<double> gains;
+  std::vector<double> gains, by_stretch;
   for (std::size_t f = 0; f < count; ++f) {
     const MatrixXd nf = n_all - n[f];
     const VectorXd gf = g_all - g[f];
@@ -193,8 +218,18 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
       return theta.dot(n[f] * theta) - 2.0 * g[f].dot(theta);
     };
     gains.push_back(0.5 * (error(without) - error(with)));
+    for (const Stretch& s : stretches) {
+      if (s.fold != f) continue;
+      const auto here = [&](const VectorXd& theta) {
+        const VectorXd own = theta(owner[s.channel]);
+        const Index width = own.size();
+        return own.dot(s.cross.leftCols(width) * own) - 2.0 * s.cross.col(width).dot(own);
+      };
+      by_stretch.push_back(0.5 * (here(without) - here(with)));
+    }
   }
   HeldOutGain result;
+  result.chance = chance_of_gains(by_stretch);
   double squares = 0.0;
   for (const double v : gains) {
     result.gain += v;

@@ -25,6 +25,7 @@ void judge_effect(const Evidence& evidence, const SearchOptions& options, const 
   for (std::size_t i = 0; i < index; ++i) first += designs[i]->linear;
   judged.at_bound = rests_on_bound(judged.design, fit.theta.segment(first, judged.design.linear));
   const HeldOutGain held = held_out_gain(evidence, designs, index, fit, options.folds);
+  judged.held_out_chance = held.chance;
   judged.held_out = held.gain;
   judged.held_out_error = held.error;
   judged.held_out_share = held.improved;

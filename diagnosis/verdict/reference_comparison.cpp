@@ -172,7 +172,6 @@ enum class Proof {
 struct SizeVerdict {
   InReferences in_references = InReferences::kAlike;
   Proof proof = Proof::kClearExcess;
-  double chance = 1.0;  ///< of sizes that differ so far; 1 where they are not compared
 };
 
 /// Share of the squared residual of a channel in the suspect logs beyond that in the references that goes when a residual
@@ -373,8 +372,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
             taken_over              ? Proof::kClearExcess
             : certain(sizes.mean()) ? Proof::kNone
-                                    : Proof::kExcess,
-            chance(sizes.mean())};
+                                    : Proof::kExcess};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -407,7 +405,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
-      certain(difference) ? Proof::kNone : Proof::kExcess, chance(difference)};
+      certain(difference) ? Proof::kNone : Proof::kExcess};
 }
 
 /// Whether an effect found as a difference acts in a channel, or something there stays unexplained.
@@ -450,24 +448,17 @@ bool joins_both(InReferences there) {
   return there == InReferences::kAlike || there == InReferences::kVaries;
 }
 
-/// Whether a difference to a law of the references improves the prediction of motions left out: Student's test on the folds' gains at
-/// the level of the sizes' difference. A law that is not exact has another size in other motions, by a few of them.
-bool predicts_left_out(const Diagnosis& d, const FoundEffect& f, const SearchOptions& options) {
-  const std::vector<AppliedEffect>& all = d.evidence.options.shared;
-  const bool known = std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    return same_place(e, f.design.effect);
-  });
-  if (!known) return true;
-  const double chance = student_tail(f.held_out / f.held_out_error, options.folds - 1.0);
+/// Whether a difference improves the prediction of motions left out, at the level of the sizes' difference. A law that is not exact has
+/// another size in other motions, by a few of them.
+bool predicts_left_out(const Diagnosis& d, const FoundEffect& f) {
   if (tracing())
     fmt::print(stderr, "    gain on motions left out {:.4g} +- {:.2g} nats, by chance {:.2g}\n",
-               f.held_out, f.held_out_error, chance);
-  return chance < d.thresholds.difference_false_alarm;
+               f.held_out, f.held_out_error, f.held_out_chance);
+  return f.held_out_chance < d.thresholds.difference_false_alarm;
 }
 
 /// Judges a significant difference by the motions left out and by the residuals of both groups of logs.
-InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared,
-                         const SearchOptions& options) {
+InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdict& compared) {
   if (joins_both(compared.in_references)) return compared.in_references;
   // Only what the references show as well is named as lacking in both.
   const InReferences no_change =
@@ -475,9 +466,8 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
           ? InReferences::kVaries
           : InReferences::kAlike;
   // what the residuals of all channels must prove is not proven by its size
-  const bool by_size = compared.proof != Proof::kClearExcess &&
-                       !(compared.chance < d.thresholds.difference_beyond_doubt);
-  if (by_size && !predicts_left_out(d, d.search.found[found], options)) return no_change;
+  if (compared.proof != Proof::kClearExcess && !predicts_left_out(d, d.search.found[found]))
+    return no_change;
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.
@@ -494,7 +484,7 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
 
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
   if (tracing()) trace_channels(d, found);
-  return by_residual(d, found, by_size(d, found, options), options);
+  return by_residual(d, found, by_size(d, found, options));
 }
 
 std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
@@ -508,7 +498,7 @@ std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOpti
                                   [](const SizeVerdict& v) { return joins_both(v.in_references); });
   std::vector<InReferences> there;
   for (std::size_t i = 0; i < by.size(); ++i)
-    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i], options));
+    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i]));
   return there;
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "models/math/linear_algebra.h"
+#include "models/math/student.h"
 #include "tests/diagnosis/evidence_support.h"
 
 namespace sparflow {
@@ -196,26 +197,34 @@ HeldOutGain by_refitting(const Evidence& e, const std::vector<const EffectDesign
   for (Index k = 0; k < x.cols(); ++k) {
     if (k != static_cast<Index>(index)) reduced.col(at++) = rows.col(k);
   }
-  std::vector<double> gains;
+  std::vector<double> gains, by_stretch;
   for (int f = 0; f < folds; ++f) {
     std::vector<Index> in, out;
     for (std::size_t b = 0; b < c.blocks.size(); ++b) {
       for (Index i = c.blocks[b].first; i < c.blocks[b].last; ++i)
         (static_cast<int>(b) % folds == f ? out : in).push_back(i);
     }
-    const auto error = [&](const MatrixXd& all) {
+    const auto error = [&](const MatrixXd& all) -> VectorXd {  // squared, of every row
       const VectorXd theta =
           least_squares(MatrixXd(all(in, Eigen::all)), VectorXd(rows.rightCols(1)(in, 0)));
-      return (VectorXd(rows.rightCols(1)(out, 0)) - MatrixXd(all(out, Eigen::all)) * theta)
-          .squaredNorm();
+      return (rows.rightCols(1) - all * theta).array().square();
     };
-    gains.push_back(0.5 * (error(reduced) - error(rows.leftCols(x.cols()))));
+    const VectorXd gain = 0.5 * (error(reduced) - error(rows.leftCols(x.cols())));
+    gains.push_back(gain(out).sum());
+    for (std::size_t b = static_cast<std::size_t>(f); b < c.blocks.size();
+         b += static_cast<std::size_t>(folds))
+      by_stretch.push_back(
+          gain.segment(c.blocks[b].first, c.blocks[b].last - c.blocks[b].first).sum());
   }
   HeldOutGain g;
   double squares = 0.0;
   for (const double v : gains) g.gain += v;
   for (const double v : gains) squares += std::pow(v - g.gain / folds, 2);
   g.error = std::sqrt(squares * folds / (folds - 1.0));
+  const VectorXd each = Eigen::Map<VectorXd>(by_stretch.data(), std::ssize(by_stretch));
+  const auto count = static_cast<double>(each.size());
+  const double deviation = std::sqrt((each.array() - each.mean()).square().sum() / (count - 1.0));
+  g.chance = student_tail(each.mean() / deviation * std::sqrt(count), count - 1.0);
   return g;
 }
 
@@ -231,27 +240,47 @@ TEST(HeldOutGain, IsThatOfRefittingWithoutTheMotions) {
     // Ridges that keep the systems solvable, 1e-10 to 1e-9 of a parameter's information, differ between both ways.
     EXPECT_NEAR(fast.gain, dense.gain, 1e-4 * (1.0 + std::abs(dense.gain)));
     EXPECT_NEAR(fast.error, dense.error, 1e-4 * (1.0 + dense.error));
+    EXPECT_NEAR(std::log(fast.chance), std::log(dense.chance), 1e-3);
   }
 }
 
 TEST(HeldOutGain, RisesWithAnEffectAndFallsWithoutOne) {
   std::mt19937_64 random(8);
   double nothing = 0.0;
-  int clear = 0;
+  int clear = 0, by_chance = 0, certain = 0;
   for (unsigned seed = 0; seed < 50; ++seed) {
     const VectorXd x = slow_column(blocks(), random);
     const EffectDesign d = plain_design({x});
     const Evidence without = evidence_with(VectorXd::Zero(kRows), 1.0, 100 + seed),
                    with = evidence_with(0.5 * x, 1.0, 200 + seed);
-    nothing += held_out_gain(without, {&d}, 0, fit_effects(without, {&d}), 5).gain;
+    const HeldOutGain none = held_out_gain(without, {&d}, 0, fit_effects(without, {&d}), 5);
+    nothing += none.gain;
+    by_chance += none.chance < 0.05 ? 1 : 0;
     const HeldOutGain g = held_out_gain(with, {&d}, 0, fit_effects(with, {&d}), 5);
     clear += g.gain > g.error ? 1 : 0;
+    certain += g.chance < 0.01 ? 1 : 0;
   }
   EXPECT_LT(nothing / 50.0, 0.0)
       << "a superfluous parameter loses about half a nat on motions left out";
   // Half a nat, with a mean over fifty cases that is certain to a fraction of a nat; worse means an error of the folds.
   EXPECT_GT(nothing / 50.0, -3.0);
   EXPECT_EQ(clear, 50);
+  EXPECT_EQ(certain, 50);
+  // 2.5 of 50 at one in twenty; 7 and more have a chance of 0.01
+  EXPECT_LT(by_chance, 7);
+}
+
+/// A law that is right in one stretch of motion and wrong in the others predicts nothing, however much it gains there.
+TEST(HeldOutGain, OfOneStretchAloneIsChance) {
+  std::mt19937_64 random(9);
+  const VectorXd x = slow_column(blocks(), random);
+  VectorXd once = VectorXd::Zero(kRows);
+  const NoiseBlock& first = blocks().front();
+  once.segment(first.first, first.last - first.first) =
+      20.0 * x.segment(first.first, first.last - first.first);
+  const EffectDesign d = plain_design({x});
+  const Evidence e = evidence_with(once, 1.0, 10);
+  EXPECT_GT(held_out_gain(e, {&d}, 0, fit_effects(e, {&d}), 5).chance, 0.05);
 }
 
 /// Adds size * tanh(t / width), whose derivative has a closed form.
