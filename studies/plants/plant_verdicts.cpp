@@ -57,8 +57,13 @@ struct Change {
 
 const std::vector<Change>& changes() {
   static const std::vector<Change> all = {
-      // The plant's friction is LuGre's law, whose rigid limit is Coulomb's and whose slow limit is Dahl's.
-      {"coulomb_friction", "coulomb_friction_N", 2.5, 0.0, {"coulomb_friction", "presliding"}},
+      // The plant's friction is LuGre's law, whose rigid limit is Coulomb's and whose slow limit is Dahl's. Its breakaway force is a
+      // multiple of the dry friction (stiction_ratio), so that Stribeck's part grows with it.
+      {"coulomb_friction",
+       "coulomb_friction_N",
+       2.5,
+       0.0,
+       {"coulomb_friction", "presliding", "stribeck_friction"}},
       {"viscous_friction", "viscous_friction_N_s_m", 5.0, 0.0, {"viscous_friction"}},
       {"leakage", "leakage_lpm_100bar", 1.0, 1.5, {"leakage"}},
       {"line_loss", "line_drop_bar", 3.0, 5.0, {"line_loss"}},

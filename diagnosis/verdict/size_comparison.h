@@ -1,0 +1,27 @@
+#pragma once
+/// Size of a found effect in the suspect logs against that in the references. Used by reference_comparison.cpp only.
+#include "diagnosis/verdict/reference_comparison.h"
+
+namespace sparflow {
+
+/// What a difference needs beside its size to be called a change.
+enum class Proof {
+  kNone,        ///< its size alone is enough
+  kExcess,      ///< the residual without it exceeds that of the references in one of its channels
+  kClearExcess  ///< the same by the test over all channels: it has no sizes that could be compared
+};
+
+struct SizeVerdict {
+  InReferences in_references = InReferences::kAlike;
+  Proof proof = Proof::kClearExcess;
+};
+
+bool same_place(const AppliedEffect& a, const EffectAt& b);
+
+/// Whether the found effect's columns act in all logs already, so that it is a difference.
+bool is_shared(const Evidence& evidence, const FoundEffect& f);
+
+/// Compares by a random-effects model, and beside it by the form error of the law. @param found index into the effects found
+SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options);
+
+}  // namespace sparflow
