@@ -150,54 +150,70 @@ double chance_of_gains(const std::vector<double>& gains) {
 
 /// A stretch of motion in which an effect acts.
 struct Stretch {
-  std::size_t fold, channel;
-  MatrixXd
-      cross;  ///< of the designs that touch the channel, with each other and with the measured values
+  std::size_t fold;
+  std::vector<Index> owner;  ///< parameters of its columns
+  MatrixXd cross;            ///< of the columns with each other and with the measured values
 };
+
+/// Normal equations of the folds, over all parameters of the designs.
+struct Folds {
+  std::vector<MatrixXd> n;
+  std::vector<VectorXd> g;
+  std::vector<Stretch> stretches;  ///< of the effect that is judged
+
+  Folds(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
+        std::size_t index, const EffectFit& fit, std::size_t count) {
+    const Layout layout(designs);
+    n.assign(count, MatrixXd::Zero(layout.count, layout.count));
+    g.assign(count, VectorXd::Zero(layout.count));
+    for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
+      const EvidenceChannel& channel = evidence.channels[c];
+      const MatrixXd columns = columns_of(designs, c, channel.rows());
+      const Index width = columns.cols();
+      if (width == 0) continue;
+      std::vector<Index> owner;
+      for (std::size_t k = 0; k < designs.size(); ++k)
+        for (Index i = 0; i < designs[k]->columns[c].cols(); ++i)
+          owner.push_back(layout.first[k] + i);
+      const MatrixXd rows =
+          whitened_rows(channel, fit.noise[c], columns) / std::sqrt(fit.noise[c].variance);
+      for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+        const NoiseBlock& block = channel.blocks[b];
+        const Index length = block.last - block.first;
+        const MatrixXd part = rows.middleRows(block.first, length);
+        const MatrixXd cross = transposed_product(part.leftCols(width), part);
+        if (designs[index]->touches(c) &&
+            !designs[index]->columns[c].middleRows(block.first, length).isZero(0.0))
+          stretches.push_back({b % count, owner, cross});
+        for (Index i = 0; i < width; ++i) {
+          const Index oi = owner[static_cast<std::size_t>(i)];
+          g[b % count][oi] += cross(i, width);
+          for (Index j = 0; j < width; ++j)
+            n[b % count](oi, owner[static_cast<std::size_t>(j)]) += cross(i, j);
+        }
+      }
+    }
+  }
+};
+
+/// Squared error that a stretch leaves, up to a constant.
+double error_of(const Stretch& s, const VectorXd& theta) {
+  const VectorXd own = theta(s.owner);
+  return own.dot(s.cross.leftCols(own.size()) * own) - 2.0 * s.cross.col(own.size()).dot(own);
+}
+
 }  // namespace
 
 HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const EffectDesign*>& designs,
                           std::size_t index, const EffectFit& fit, int folds) {
   const Layout layout(designs);
-  const std::size_t channels = evidence.channels.size();
-  std::vector<MatrixXd> rows(channels);
-  std::vector<std::vector<Index>> owner(channels);
   const auto count = static_cast<std::size_t>(folds);
-  std::vector<MatrixXd> n(count, MatrixXd::Zero(layout.count, layout.count));
-  std::vector<VectorXd> g(count, VectorXd::Zero(layout.count));
-  std::vector<bool> used(channels, false);
-  std::vector<Stretch> stretches;
-  for (std::size_t c = 0; c < channels; ++c) {
-    const MatrixXd columns = columns_of(designs, c, evidence.channels[c].rows());
-    const Index width = columns.cols();
-    if (width == 0) continue;
-    used[c] = true;
-    for (std::size_t k = 0; k < designs.size(); ++k) {
-      for (Index i = 0; i < designs[k]->columns[c].cols(); ++i)
-        owner[c].push_back(layout.first[k] + i);
-    }
-    rows[c] = whitened_rows(evidence.channels[c], fit.noise[c], columns) /
-              std::sqrt(fit.noise[c].variance);
-    for (std::size_t b = 0; b < evidence.channels[c].blocks.size(); ++b) {
-      const NoiseBlock& block = evidence.channels[c].blocks[b];
-      const MatrixXd part = rows[c].middleRows(block.first, block.last - block.first);
-      const MatrixXd cross = transposed_product(part.leftCols(width), part);
-      if (designs[index]->touches(c) &&
-          !designs[index]->columns[c].middleRows(block.first, block.last - block.first).isZero(0.0))
-        stretches.push_back({b % count, c, cross});
-      for (Index i = 0; i < width; ++i) {
-        const Index oi = owner[c][static_cast<std::size_t>(i)];
-        g[b % count][oi] += cross(i, width);
-        for (Index j = 0; j < width; ++j)
-          n[b % count](oi, owner[c][static_cast<std::size_t>(j)]) += cross(i, j);
-      }
-    }
-  }
+  const Folds data(evidence, designs, index, fit, count);
   MatrixXd n_all = MatrixXd::Zero(layout.count, layout.count);
   VectorXd g_all = VectorXd::Zero(layout.count);
   for (std::size_t f = 0; f < count; ++f) {
-    n_all += n[f];
-    g_all += g[f];
+    n_all += data.n[f];
+    g_all += data.g[f];
   }
   std::vector<Index> others;
   for (Index i = 0; i < layout.count; ++i) {
@@ -206,27 +222,18 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
   }
   std::vector<double> gains, by_stretch;
   for (std::size_t f = 0; f < count; ++f) {
-    const MatrixXd nf = n_all - n[f];
-    const VectorXd gf = g_all - g[f];
+    const MatrixXd nf = n_all - data.n[f];
+    const VectorXd gf = g_all - data.g[f];
     const VectorXd with = solve(nf, gf);
     VectorXd without = VectorXd::Zero(layout.count);
-    const VectorXd reduced = solve(nf(others, others), gf(others));
-    for (std::size_t i = 0; i < others.size(); ++i)
-      without[others[i]] = reduced[static_cast<Index>(i)];
+    without(others) = solve(nf(others, others), gf(others));
     // squared error on the fold, up to a constant: theta'N theta - 2 g'theta
     const auto error = [&](const VectorXd& theta) {
-      return theta.dot(n[f] * theta) - 2.0 * g[f].dot(theta);
+      return theta.dot(data.n[f] * theta) - 2.0 * data.g[f].dot(theta);
     };
     gains.push_back(0.5 * (error(without) - error(with)));
-    for (const Stretch& s : stretches) {
-      if (s.fold != f) continue;
-      const auto here = [&](const VectorXd& theta) {
-        const VectorXd own = theta(owner[s.channel]);
-        const Index width = own.size();
-        return own.dot(s.cross.leftCols(width) * own) - 2.0 * s.cross.col(width).dot(own);
-      };
-      by_stretch.push_back(0.5 * (here(without) - here(with)));
-    }
+    for (const Stretch& s : data.stretches)
+      if (s.fold == f) by_stretch.push_back(0.5 * (error_of(s, without) - error_of(s, with)));
   }
   HeldOutGain result;
   result.chance = chance_of_gains(by_stretch);

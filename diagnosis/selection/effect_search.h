@@ -120,10 +120,10 @@ struct FoundEffect {
   double absorbed = 0.0;             ///< 0..1 absorbed share over all channels
   double absorbed_where_seen = 1.0;  ///< 0..1 EffectAction::absorbed_where_seen
   double held_out = 0.0,
-         held_out_error = 0.0;  ///< [nats] gain on motions left out, and its standard error
+         held_out_error = 0.0;   ///< [nats] gain on motions left out, and its standard error
   double held_out_chance = 1.0;  ///< 0..1 HeldOutGain::chance
   double held_out_share = 0.0;   ///< 0..1 share of the folds whose error it reduces
-  double over_form = 1e9;       ///< [-] EffectAction::over_form
+  double over_form = 1e9;        ///< [-] EffectAction::over_form
   /// Fails the joint significance test: the joint 95 % region (sampling error alone) of its linear parameters contains
   /// zero or, where it refines a plainer effect, the interval of a nonlinear parameter does.
   bool not_significant = false;

@@ -65,7 +65,8 @@ class FlowSaturation final : public Effect {
             "Q_i = s Q_i(u), s = min(1, limit / sum of Q(u)), soft: (1 + (sum / "
             "limit)^12)^(-1/12), "
             "pump pressure - margin (1 - s^2); not shared: Q_i = Q_i(u) min(1, (p - p_i)/dp_i)^0.5 "
-            "with the pump pressure p at which their sum is the limit",
+            "with the pump pressure p at which their sum is the limit; in the line's balance: "
+            "C dp/dt = min(Q_pump, limit) - sum Q_i - C p/rest",
         .signals = {"commands", "position"},
         .confused_with = {"torque_limit", "valve_deadband", "pump_lag"},
         .separated_by = "each cylinder alone at full command, then all together",
