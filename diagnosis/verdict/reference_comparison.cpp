@@ -113,9 +113,14 @@ bool joins_both(InReferences there) {
   return there == InReferences::kAlike || there == InReferences::kVaries;
 }
 
-/// Whether a difference improves the prediction of motions left out, at the level of the sizes' difference. A law that is not exact has
-/// another size in other motions, by a few of them.
+/// Whether a difference to a law of the references improves the prediction of motions left out, at the level of the sizes' difference. A law
+/// that is not exact has another size in other motions, by a few of them. One that the references do not have has no such share.
 bool predicts_left_out(const Diagnosis& d, const FoundEffect& f) {
+  const std::vector<AppliedEffect>& all = d.evidence.options.shared;
+  const bool known = std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
+    return same_place(e, f.design.effect);
+  });
+  if (!known) return true;
   if (tracing())
     fmt::print(stderr, "    gain on motions left out {:.4g} +- {:.2g} nats, by chance {:.2g}\n",
                f.held_out, f.held_out_error, f.held_out_chance);
