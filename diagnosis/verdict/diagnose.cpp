@@ -204,6 +204,14 @@ void search(const CraneModel& model, const DiagnoseOptions& options, const Searc
   }
 }
 
+/// Whether references cannot tell if the suspect logs differ there, so that it is a note and no change.
+bool noted_as_untold(Diagnosis& d, const Unexplained& left) {
+  if (!d.evidence.has_reference() || chance_beyond_references(d, left.channel)) return false;
+  d.notes.push_back(left.sentence +
+                    "; the references have too few motions there to tell whether that has changed");
+  return true;
+}
+
 /// Finds the structure that the effects leave in the residual and tells the worst of it.
 /// @return the structure above the share from which it counts
 std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, Diagnosis& d) {
@@ -220,12 +228,7 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
       d.shared_structure.push_back(describe_residual_structure(d.evidence, l));
       continue;
     }
-    if (d.evidence.has_reference() && !chance_beyond_references(d, l.channel)) {
-      d.notes.push_back(
-          describe_residual_structure(d.evidence, l).sentence +
-          "; the references have too few motions there to tell whether that has changed");
-      continue;
-    }
+    if (noted_as_untold(d, describe_residual_structure(d.evidence, l))) continue;
     const double share = unmodelled_share(d, l, beside[i]);
     if (touched) d.unmodelled_share = std::max(d.unmodelled_share, share);
     if (share <
@@ -239,20 +242,25 @@ std::vector<ResidualStructure> find_unmodelled(const DiagnoseOptions& options, D
   }
   if (d.search.found.empty() && !d.unexplained && !d.search.unnamed.empty()) {
     // what both logs lack may gain most, and another one in another channel be the change
+    std::optional<Unexplained> shared;
     for (const FoundEffect& f : d.search.unnamed) {
       Unexplained unnamed = describe_unnamed(d, f);
-      if (!exceeds_references(d, unnamed.channel)) continue;
-      d.unexplained = std::move(unnamed);
-      break;
+      if (noted_as_untold(d, unnamed)) continue;
+      std::optional<Unexplained>& where =
+          exceeds_references(d, unnamed.channel) ? d.unexplained : shared;
+      if (!where) where = std::move(unnamed);
+      if (d.unexplained) break;
     }
-    if (!d.unexplained) d.shared_structure.push_back(describe_unnamed(d, d.search.unnamed.front()));
+    if (!d.unexplained && shared) d.shared_structure.push_back(std::move(*shared));
   }
   if (d.search.found.empty() && !d.unexplained && d.search.once) {
     Unexplained event = describe_isolated_event(d, options.isolated_event);
-    if (exceeds_references(d, event.channel))
-      d.unexplained = std::move(event);
-    else
-      d.shared_structure.push_back(std::move(event));
+    if (!noted_as_untold(d, event)) {
+      if (exceeds_references(d, event.channel))
+        d.unexplained = std::move(event);
+      else
+        d.shared_structure.push_back(std::move(event));
+    }
   }
   if (d.search.found.empty() && !d.unexplained) {
     if (const std::optional<std::size_t> channel = channel_beyond_references(d))

@@ -517,6 +517,21 @@ TEST(Diagnose, AnIsolatedEventIsNeitherALawNorNoise) {
   const double when = column("t_s")[from];
   EXPECT_NEAR(std::stod(d.headline().substr(d.headline().find("from ") + 5)), when, 1.0)
       << d.headline();
+  // a reference that ends before the boom moves twice cannot tell whether that is new
+  simulator::GeneratedLog& reference = logs.logs.reference;
+  const auto boom = std::find(reference.names.begin(), reference.names.end(), "u_boom");
+  const std::vector<double>& u =
+      reference.columns.at(static_cast<std::size_t>(boom - reference.names.begin()));
+  std::size_t end = 1;
+  for (int starts = 0; end < u.size(); ++end)
+    if (u[end] != 0.0 && u[end - 1] == 0.0 && ++starts == 2) break;
+  for (std::vector<double>& values : reference.columns) values.resize(end);
+  const Log short_reference =
+      log_from_text("reference.csv", simulator::csv_text(reference), crane());
+  const Diagnosis untold = diagnose(reference_model(), {logs.train}, {short_reference});
+  EXPECT_EQ(untold.verdict, Verdict::kNone) << untold.table();
+  EXPECT_THAT(untold.notes, testing::Contains(testing::AllOf(HasSubstr("force of boom"),
+                                                             HasSubstr("too few motions there"))));
 }
 
 }  // namespace
