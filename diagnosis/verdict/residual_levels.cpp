@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
@@ -58,14 +59,17 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
 
 /// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
 /// Student's prediction of one further value, by Bonferroni's bound over the suspect blocks. A deviation in one stretch
-/// of motion hardly moves the mean level. Levels are no normal deviates: where the references have nearly as large a one, it is
-/// no difference.
+/// of motion hardly moves the mean level. Levels are no normal deviates. Far out the tail is Laplace's, exponential in the logarithm:
+/// in 115 channels of logs without a change Student's has said "below 0.001" of five. And where the references have nearly as large a one,
+/// it is no difference.
 /// @param excess ratio of the RMS
 double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
   if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
   const double n = reference.blocks;
   const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  return suspect.blocks * student_tail((suspect.largest - reference.mean) / deviation, n - 1.0);
+  const double z = (suspect.largest - reference.mean) / deviation;
+  const double laplace = 0.5 * std::exp(-std::numbers::sqrt2 * z);
+  return suspect.blocks * std::max(student_tail(z, n - 1.0), laplace);
 }
 
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and

@@ -11,8 +11,9 @@ namespace sparflow {
 
 /// Probabilities by chance that the residual of a channel in the suspect logs exceeds that in the references so far.
 struct Excess {
-  double level = 1.0;    ///< in the mean over the blocks
-  double largest = 1.0;  ///< in the largest block, by Student's prediction of one further block
+  double level = 1.0;  ///< in the mean over the blocks
+  double largest =
+      1.0;  ///< in the largest block, by Student's prediction of one further block or Laplace's tail
 };
 inline constexpr double kWaysToExceed = 2.0;  ///< level and a block, for Bonferroni's bound
 

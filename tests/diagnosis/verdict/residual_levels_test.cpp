@@ -4,11 +4,15 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <random>
+#include <vector>
 
 #include "diagnosis/residual/residual_model.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/unmodelled_structure.h"
+#include "models/math/student.h"
 #include "tests/diagnosis/evidence_support.h"
 #include "tests/diagnosis/hidden_case.h"
 
@@ -20,9 +24,12 @@ using Eigen::VectorXd;
 constexpr double kNoise = 500.0;  // [N]
 
 /// A suspect and a reference log whose residuals are noise of one level in every channel.
-Diagnosis with_noise() {
+Diagnosis with_noise(double seconds = 90.0) {
   const Machine machine = testing_support::drawn_machine("loader_crane");
-  static const auto logs = testing_support::hidden_case(machine, {}, {5, 90.0});
+  static std::map<double, testing_support::HiddenCase> all;
+  if (!all.contains(seconds))
+    all.emplace(seconds, testing_support::hidden_case(machine, {}, {5, seconds}));
+  const testing_support::HiddenCase& logs = all.at(seconds);
   Diagnosis d;
   d.evidence = collect_evidence(CraneModel::untrained(machine), {make_signals(machine, logs.train)},
                                 {make_signals(machine, logs.reference)});
@@ -65,8 +72,8 @@ Diagnosis with_laws(double suspect, double reference) {
 }
 
 /// Force of the jib whose noise is a multiple of the usual in a short stretch of motion of either log, one of ten rows or more.
-Diagnosis with_loud_stretch(double suspect, double reference) {
-  Diagnosis d = with_noise();
+Diagnosis with_loud_stretch(double suspect, double reference, double seconds = 90.0) {
+  Diagnosis d = with_noise(seconds);
   EvidenceChannel& channel = d.evidence.channels[jib_force(d)];
   for (const int log : {0, 1}) {
     NoiseBlock shortest = {0, channel.y.size()};
@@ -113,6 +120,35 @@ TEST(ResidualLevels, OneStretchOfMotionIsComparedWithTheLargestOfTheReferences) 
   }
   EXPECT_EQ(channel_beyond_references(with_loud_stretch(40.0, 40.0)), std::nullopt);
   EXPECT_EQ(channel_beyond_references(with_loud_stretch(1.0, 1.0)), std::nullopt);
+}
+
+/// Chance of a largest stretch: Student's prediction, but no less than that of an exponential tail in the logarithm of its mean square.
+TEST(ResidualLevels, ALargestStretchHasTheHeavierOfTwoTails) {
+  for (const double seconds : {90.0, 300.0}) {  // few stretches or many
+    const Diagnosis d = with_loud_stretch(4.0, 1.0, seconds);
+    const std::size_t jib = jib_force(d);
+    const EvidenceChannel& channel = d.evidence.channels[jib];
+    const VectorXd residual = settled(d, jib, d.search.final.residual[jib]);
+    std::vector<double> references;
+    double largest = -1e300, suspects = 0.0;
+    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+      const Eigen::Index first = channel.blocks[b].first, n = channel.blocks[b].last - first;
+      const double level = std::log(residual.segment(first, n).array().square().mean());
+      if (channel.log[b] == 0)
+        largest = std::max(largest, level), suspects += 1.0;
+      else
+        references.push_back(level);
+    }
+    const Eigen::Map<const VectorXd> v(references.data(), std::ssize(references));
+    const auto n = static_cast<double>(references.size());
+    const double variance = (v.array() - v.mean()).square().sum() / (n - 1.0);
+    const double z = (largest - v.mean()) / std::sqrt(variance * (1.0 + 1.0 / n));
+    const double student = student_tail(z, n - 1.0),
+                 exponential = 0.5 * std::exp(-std::sqrt(2.0) * z);
+    EXPECT_EQ(exponential > student, seconds == 300.0) << z;
+    EXPECT_NEAR(std::log(excess_over_references(d, jib)->largest),
+                std::log(suspects * (seconds == 300.0 ? exponential : student)), 1e-6);
+  }
 }
 
 /// What the references leave as well is no sign against an effect in the suspect log, unless it has the opposite sign.
