@@ -136,8 +136,9 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
           ? InReferences::kVaries
           : InReferences::kAlike;
   // what the residuals of all channels must prove is not proven by its size
-  if (compared.proof != Proof::kClearExcess && !predicts_left_out(d, d.search.found[found]))
-    return no_change;
+  const bool by_size = compared.proof != Proof::kClearExcess &&
+                       !(compared.chance < d.thresholds.difference_beyond_doubt);
+  if (by_size && !predicts_left_out(d, d.search.found[found])) return no_change;
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.

@@ -306,7 +306,8 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
             taken_over              ? Proof::kClearExcess
             : certain(sizes.mean()) ? Proof::kNone
-                                    : Proof::kExcess};
+                                    : Proof::kExcess,
+            chance(sizes.mean())};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -339,7 +340,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
-      certain(difference) ? Proof::kNone : Proof::kExcess};
+      certain(difference) ? Proof::kNone : Proof::kExcess, chance(difference)};
 }
 
 }  // namespace sparflow

@@ -14,6 +14,7 @@ enum class Proof {
 struct SizeVerdict {
   InReferences in_references = InReferences::kAlike;
   Proof proof = Proof::kClearExcess;
+  double chance = 1.0;  ///< of sizes that differ so far; 1 where they are not compared
 };
 
 bool same_place(const AppliedEffect& a, const EffectAt& b);
