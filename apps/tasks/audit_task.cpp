@@ -9,6 +9,7 @@
 #include "apps/tasks/argument_range.h"
 #include "apps/tasks/benchmark/learned_machine.h"
 #include "apps/tasks/motion_inputs.h"
+#include "identification/data_checks/set_aside.h"
 #include "identification/signals/recorded_motion.h"
 #include "models/math/error.h"
 #include "models/math/robust.h"
@@ -18,11 +19,41 @@
 namespace sparflow {
 namespace {
 
+/// The signals of a log and what was set aside in them.
+struct CheckedLog {
+  MachineSignals signals;
+  std::vector<std::pair<Role, BadChannel>> bad;
+};
+
+CheckedLog checked_log(const Machine& machine, const Log& log) {
+  CheckedSignals checked = checked_signals(machine, log, {}, {}, Jumps::kSetAside);
+  CheckedLog out{std::move(checked.signals), {}};
+  for (BadChannel& b : checked.bad) {
+    const auto channel = std::find_if(log.channels.begin(), log.channels.end(),
+                                      [&](const Channel& c) { return c.signal == b.channel; });
+    out.bad.emplace_back(channel->role, std::move(b));
+  }
+  return out;
+}
+
 /// A move that was found, not yet examined.
 struct Found {
-  const MachineSignals* signals;
+  const CheckedLog* log;
   RecordedMove move;
 };
+
+/// Why a quantity is missing in a move: a channel with one of these roles is faulty there, or the log lacks it.
+std::string lacks(const Found& f, const std::string& what, const std::vector<Role>& roles) {
+  const Eigen::VectorXd& t = f.log->signals.time;
+  const double from = t[f.move.samples.begin], to = t[f.move.samples.end - 1];
+  for (const auto& [role, b] : f.log->bad) {
+    const bool here = std::any_of(b.stretches.begin(), b.stretches.end(),
+                                  [&](const auto& s) { return s.first <= to && s.second >= from; });
+    if (here && std::find(roles.begin(), roles.end(), role) != roles.end())
+      return "Bad data in it: " + bad_channel_sentence(b);
+  }
+  return fmt::format("The log lacks {} in it.", what);
+}
 
 /// Why a move cannot be compared with another motion; empty: it can.
 std::string why_not(const Found& f, const Trajectory& recorded, double largest_payload_change) {
@@ -39,10 +70,10 @@ std::string why_not(const Found& f, const Trajectory& recorded, double largest_p
         "was its work.",
         f.move.gain, f.move.way);
   if (!recorded.q.allFinite() || !recorded.qd.allFinite())
-    return "The log lacks a joint's position in it.";
+    return lacks(f, "a joint's position", {Role::kJointPosition, Role::kStroke});
   const Eigen::VectorXd load =
-      f.signals->payload.segment(f.move.samples.begin, f.move.samples.size());
-  if (!load.allFinite()) return "The log lacks the payload in it.";
+      f.log->signals.payload.segment(f.move.samples.begin, f.move.samples.size());
+  if (!load.allFinite()) return lacks(f, "the payload", {Role::kPayload});
   if (load.maxCoeff() - load.minCoeff() > largest_payload_change)
     return fmt::format("The payload changes on the way, from {:.0f} to {:.0f} kg.", load.minCoeff(),
                        load.maxCoeff());
@@ -50,11 +81,11 @@ std::string why_not(const Found& f, const Trajectory& recorded, double largest_p
 }
 
 /// The moves of all logs with the longest way, at most `most`, in order of time. @param left_out number of the others
-std::vector<Found> find_moves(const std::vector<MachineSignals>& logs, const AuditTask& a,
+std::vector<Found> find_moves(const std::vector<CheckedLog>& logs, const AuditTask& a,
                               int& left_out) {
   std::vector<Found> found;
-  for (const MachineSignals& s : logs)
-    for (const RecordedMove& m : recorded_moves(s, a.cutting)) found.push_back({&s, m});
+  for (const CheckedLog& log : logs)
+    for (const RecordedMove& m : recorded_moves(log.signals, a.cutting)) found.push_back({&log, m});
   left_out = std::max(0, static_cast<int>(found.size()) - a.most);
   if (left_out == 0) return found;
   std::vector<double> ways;
@@ -70,14 +101,15 @@ AuditedMove examine(const CraneModel& model, const Found& f, const AuditTask& a,
                     const MoveAuditOptions& options, const Listener& listener) {
   AuditedMove out;
   const SampleRange range = f.move.samples;
-  out.log = f.signals->file;
-  out.from = f.signals->time[range.begin];
-  out.to = f.signals->time[range.end - 1];
-  const std::vector<double> measured = measured_energy(model.machine, *f.signals, range);
+  const MachineSignals& signals = f.log->signals;
+  out.log = signals.file;
+  out.from = signals.time[range.begin];
+  out.to = signals.time[range.end - 1];
+  const std::vector<double> measured = measured_energy(model.machine, signals, range);
   out.measured = std::accumulate(measured.begin(), measured.end(), 0.0);
-  out.recorded = recorded_motion(model.machine, *f.signals, range);
+  out.recorded = recorded_motion(model.machine, signals, range);
   // what a load cell's noise may be; a load that is taken or put down is more
-  const Eigen::VectorXd load = f.signals->payload.segment(range.begin, range.size());
+  const Eigen::VectorXd load = signals.payload.segment(range.begin, range.size());
   out.payload = a.payload >= 0.0 ? a.payload : median(load);
   /// @threshold [kg] 0..1000; chosen: the noise of a load cell and of its swinging load
   constexpr double kLeastChange = 50.0;
@@ -85,6 +117,10 @@ AuditedMove examine(const CraneModel& model, const Found& f, const AuditTask& a,
   constexpr double kChange = 0.1;
   out.audit.not_judged =
       why_not(f, out.recorded, std::max(kLeastChange, kChange * std::abs(out.payload)));
+  const bool logged = std::all_of(signals.pumps.begin(), signals.pumps.end(),
+                                  [](const PumpSignals& p) { return p.pressure.size() > 0; });
+  if (out.audit.judged() && logged && !std::isfinite(out.measured))
+    out.audit.not_judged = lacks(f, "the pump's pressure", {Role::kPumpPressure});
   if (!out.audit.judged()) return out;
   out.recorded.t.array() -= out.from;
   out.recorded.qd.row(0).setZero();
@@ -178,14 +214,16 @@ void check_ranges(const AuditTask& task) {
 AuditResult audit_task(const CraneModel& model, std::vector<Log>&& logs, const AuditTask& task,
                        const Listener& listener) {
   check_ranges(task);
-  std::vector<MachineSignals> signals;
-  signals.reserve(logs.size());
+  std::vector<CheckedLog> checked;
+  checked.reserve(logs.size());
   AuditResult result;
   result.litres_per_kWh = task.litres_per_kWh;
   bool payload_known = true, pressure_known = true;
   for (const Log& log : logs) {
-    signals.push_back(make_signals(model.machine, log));
-    const MachineSignals& s = signals.back();
+    checked.push_back(checked_log(model.machine, log));
+    const MachineSignals& s = checked.back().signals;
+    for (const auto& [role, b] : checked.back().bad)
+      result.notes.push_back(fmt::format("Set aside in {}: {}", log.file, bad_channel_sentence(b)));
     for (const SampleRange& run : s.runs) result.seconds += s.time[run.end - 1] - s.time[run.begin];
     result.at_rest += time_at_rest(s);
     if (task.engine) add_fuel(model.machine, *task.engine, s, result);
@@ -201,7 +239,7 @@ AuditResult audit_task(const CraneModel& model, std::vector<Log>&& logs, const A
     result.notes.push_back(
         "A log has no pump pressure, so that nothing tells how far the model can be trusted in "
         "it.");
-  const std::vector<Found> found = find_moves(signals, task, result.not_examined);
+  const std::vector<Found> found = find_moves(checked, task, result.not_examined);
   if (found.empty())
     throw InputError({first, 0, 0}, "",
                      fmt::format("no move of more than {:.2g} m of the rods together was found in "

@@ -45,6 +45,7 @@ ExtendResult extend(const CraneModel& model, const std::vector<EffectAt>& add,
     };
   };
   ExtendResult result;
+  result.notes = context.set_aside();
   Judged current = context.as_it_is(model, result.notes, part(0));
   for (std::size_t i = 0; i < add.size(); ++i) {
     TriedStep tried = try_adding(context, current, add[i], part(i + 1));
@@ -80,6 +81,7 @@ ExtendResult take_back(const CraneModel& model, const EffectAt& effect, const Ex
     };
   };
   ExtendResult result;
+  result.notes = context.set_aside();
   Judged current = context.as_it_is(model, result.notes, part(0.0));
   TriedStep tried = try_removing(context, current, effect, part(0.5));
   keep(std::move(tried), context, current, result);

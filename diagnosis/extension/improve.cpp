@@ -8,7 +8,6 @@
 #include "diagnosis/extension/extension_step.h"
 #include "diagnosis/extension/improve_round.h"
 #include "diagnosis/extension/improvement.h"
-#include "identification/data_checks/set_aside.h"
 #include "models/effects/registry.h"
 #include "models/math/error.h"
 #include "models/math/interruption.h"
@@ -47,13 +46,6 @@ std::string stands_for(const DiagnosedEffect& e) {
   for (const auto& [key, worse] : e.rivals) rivals += (rivals.empty() ? "" : ", ") + key;
   return fmt::format("{} is one of an indistinguishable set: {} explains these logs as well",
                      e.key(), rivals);
-}
-
-/// The logs without what the data checks set aside, which takes part in no estimate.
-ExtendLogs without_faults(ExtendLogs logs, const std::vector<LogFault>& faults) {
-  for (const LogFault& f : faults)
-    logs.suspects[f.log] = without_bad_data(std::move(logs.suspects[f.log]), {f.channel});
-  return logs;
 }
 
 /// Why no effect is added after a diagnosis, as a phrase.
@@ -145,8 +137,7 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
   // the machine stays while effects come, so what is seen of the logs and their faults serves every diagnosis
   const DiagnosisSignals signals =
       diagnosis_signals(model.machine, logs.suspects, logs.references, options.diagnose);
-  const ExtendLogs usable = without_faults(logs, signals.set_aside);
-  const RefitContext context(model, usable, options);
+  const RefitContext context(model, logs, options);
   // the number of rounds is unknown, so each advances by a share of the remaining progress
   double done = 0.0;
   const auto part = [&](double width) {
@@ -155,8 +146,7 @@ ExtendResult improve(const CraneModel& model, const ExtendLogs& logs, const Exte
     };
   };
   ExtendResult result;
-  for (const LogFault& f : signals.set_aside)
-    result.notes.push_back("set aside: " + bad_channel_sentence(f.channel));
+  result.notes = context.set_aside();
   Judged current = context.as_it_is(model, result.notes, part(0.05));
   done = 0.05;
   Improvement improvement(context, result, current);

@@ -1,18 +1,33 @@
 #include "diagnosis/extension/refit_context.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "diagnosis/evidence/left_out_rows.h"
+#include "identification/data_checks/set_aside.h"
 #include "models/math/error.h"
 
 namespace sparflow {
 namespace {
 
+/// Signals of these logs without what is faulty in them, jumps excepted, and sentences about that.
 std::vector<MachineSignals> signals_of(const Machine& machine, const std::vector<Log>& logs,
-                                       const SignalOptions& options) {
+                                       const FitOptions& options, std::vector<std::string>& notes) {
   std::vector<MachineSignals> out;
   out.reserve(logs.size());
-  for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
+  for (const Log& log : logs) {
+    if (!options.check_data) {
+      out.push_back(make_signals(machine, log, options.signals));
+      continue;
+    }
+    CheckedSignals one =
+        checked_signals(machine, log, options.signals, options.bad_data, Jumps::kStay);
+    out.push_back(std::move(one.signals));
+    for (const BadChannel& b : one.bad)
+      if (b.kind != BadDataKind::kJumping)
+        notes.push_back(fmt::format("set aside: {}: {}", log.file, bad_channel_sentence(b)));
+  }
   return out;
 }
 
@@ -72,11 +87,10 @@ RefitContext::RefitContext(const CraneModel& model, const ExtendLogs& logs,
                            const ExtendOptions& options)
     : machine_(model.machine), logs_(logs), options_(options) {
   if (logs.suspects.empty()) throw InputError({}, "log", "no log to learn from; give at least one");
-  const SignalOptions& how = options.fit.signals;
-  signals_ = signals_of(machine_, logs.suspects, how);
-  references_ = signals_of(machine_, logs.references, how);
+  signals_ = signals_of(machine_, logs.suspects, options.fit, set_aside_);
+  references_ = signals_of(machine_, logs.references, options.fit, set_aside_);
   if (!logs.references.empty()) in_references_ = effects_in_references(model, references_);
-  test_signals_ = signals_of(machine_, logs.tests, how);
+  test_signals_ = signals_of(machine_, logs.tests, options.fit, set_aside_);
   folds_ = held_out_folds(signals_, options.fit, options.folds);
   if (!logs.tests.empty()) {
     judged_on_ = "test logs";

@@ -37,6 +37,8 @@ class RefitContext {
   RefitContext(const CraneModel& model, const ExtendLogs& logs, const ExtendOptions& options);
 
   const std::string& judged_on() const { return judged_on_; }
+  /// What the data checks set aside, a sentence for each channel.
+  const std::vector<std::string>& set_aside() const { return set_aside_; }
   const ExtendOptions& options() const { return options_; }
   const Machine& machine() const { return machine_; }
 
@@ -121,6 +123,7 @@ class RefitContext {
   std::vector<Mask> held_;                // held-out samples, by log; empty: nothing is held out
   std::vector<std::vector<Mask>> folds_;  // of a cross-validation; empty: nothing is held out
   std::string judged_on_;
+  std::vector<std::string> set_aside_;
 };
 
 }  // namespace sparflow

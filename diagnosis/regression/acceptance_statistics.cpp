@@ -137,15 +137,29 @@ bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const VectorXd>
 }
 
 namespace {
-/// One-sided chance of a mean so far above zero.
-double chance_of_gains(const std::vector<double>& gains) {
-  const auto count = static_cast<double>(gains.size());
-  if (gains.size() < 2) return 1.0;
-  double mean = 0.0, squares = 0.0;
-  for (const double v : gains) mean += v / count;
-  for (const double v : gains) squares += (v - mean) * (v - mean);
-  const double error = std::sqrt(squares / (count * (count - 1.0)));
-  return student_tail(mean / std::max(error, 1e-300), count - 1.0);
+/// What the other folds predict in a stretch of motion, in units of the noise.
+struct Prediction {
+  double square;   ///< of the predicted action
+  double product;  ///< of the predicted action with what the stretch shows
+};
+
+/// One-sided chance of gains as large. What the stretches show is the slope times what is predicted in them: one of an effect that acts
+/// as predicted, and below one half nothing is gained. The slope is a regression through the origin with variances in proportion to the
+/// information of the stretches (Cochran 1977, Sampling Techniques, section 6.7), at least those of the noise.
+double chance_of_gains(const std::vector<Prediction>& stretches) {
+  double squares = 0.0, products = 0.0, scatter = 0.0, count = 0.0;
+  for (const Prediction& p : stretches) {
+    if (!(p.square > 0.0)) continue;
+    squares += p.square;
+    products += p.product;
+    count += 1.0;
+  }
+  if (count < 2.0) return 1.0;
+  const double slope = products / squares;
+  for (const Prediction& p : stretches)
+    if (p.square > 0.0) scatter += std::pow(p.product - slope * p.square, 2) / p.square;
+  const double variance = std::max(1.0, scatter / (count - 1.0)) / squares;
+  return student_tail((slope - 0.5) / std::sqrt(variance), count - 1.0);
 }
 
 /// A stretch of motion in which an effect acts.
@@ -196,10 +210,11 @@ struct Folds {
   }
 };
 
-/// Squared error that a stretch leaves, up to a constant.
-double error_of(const Stretch& s, const VectorXd& theta) {
-  const VectorXd own = theta(s.owner);
-  return own.dot(s.cross.leftCols(own.size()) * own) - 2.0 * s.cross.col(own.size()).dot(own);
+Prediction prediction_in(const Stretch& s, const VectorXd& with, const VectorXd& without) {
+  const VectorXd change = with(s.owner) - without(s.owner);
+  const MatrixXd& n = s.cross;
+  const VectorXd shown = n.col(change.size()) - n.leftCols(change.size()) * without(s.owner);
+  return {change.dot(n.leftCols(change.size()) * change), change.dot(shown)};
 }
 
 }  // namespace
@@ -220,7 +235,8 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
       others.push_back(i);
   }
-  std::vector<double> gains, by_stretch;
+  std::vector<double> gains;
+  std::vector<Prediction> by_stretch;
   for (std::size_t f = 0; f < count; ++f) {
     const MatrixXd nf = n_all - data.n[f];
     const VectorXd gf = g_all - data.g[f];
@@ -233,7 +249,7 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     };
     gains.push_back(0.5 * (error(without) - error(with)));
     for (const Stretch& s : data.stretches)
-      if (s.fold == f) by_stretch.push_back(0.5 * (error_of(s, without) - error_of(s, with)));
+      if (s.fold == f) by_stretch.push_back(prediction_in(s, with, without));
   }
   HeldOutGain result;
   result.chance = chance_of_gains(by_stretch);

@@ -408,8 +408,17 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
     out.without_jumps[i] = make_signals(machine, without_bad_data(usable, jumps), options.signals);
     for (BadChannel& b : jumps) out.jumps.push_back({i, std::move(b)});
   }
-  for (const Log& log : references)
-    out.references.push_back(make_signals(machine, log, options.signals));
+  for (const Log& log : references) {
+    if (!options.check_data) {
+      out.references.push_back(make_signals(machine, log, options.signals));
+      continue;
+    }
+    CheckedSignals one =
+        checked_signals(machine, log, options.signals, options.bad_data, Jumps::kStay);
+    out.references.push_back(std::move(one.signals));
+    for (BadChannel& b : one.bad)
+      if (b.kind != BadDataKind::kJumping) out.set_aside_in_references.push_back(std::move(b));
+  }
   return out;
 }
 
@@ -430,6 +439,7 @@ Diagnosis diagnose_signals(const CraneModel& model, const DiagnosisSignals& sign
   }
   for (const auto* aside : {&signals.set_aside, &faults})
     for (const LogFault& f : *aside) d.set_aside.push_back(f.channel);
+  for (const BadChannel& b : signals.set_aside_in_references) d.set_aside.push_back(b);
   if (d.evidence.channels.empty())
     d.verdict = d.set_aside.empty() ? Verdict::kUnknown : Verdict::kBadData;
   return d;

@@ -131,11 +131,6 @@ struct VerdictOptions {
   /// @threshold [1] 0..1; tuned on seeds 14..21 of plant_verdicts: true changes behind large residuals have 0.0002 and less, untrue ones
   /// 0.0014 and more
   double difference_alone_false_alarm = 0.001;
-  /// The same probability from which on another value of a law that the references have need not predict motions left out: a law of
-  /// the flow's square has its gains in the few fast motions, which are no sample.
-  /// @threshold [1] 0..1e-6; tuned on seeds 601..642 of plant_verdicts: untrue changes have 1e-6 and more, true ones that few motions
-  /// show 1e-17 and less
-  double difference_beyond_doubt = 1e-12;
   /// Chance of a residual that exceeds that of the references so far without a found effect, from which on the effect is no
   /// change but a law that is not exact. The effect has passed the test above already.
   /// @threshold [1] 0..0.5; chosen: one in twenty, in the effect's own channels
@@ -245,6 +240,8 @@ struct DiagnosisSignals {
   std::vector<MachineSignals> references = {};
   /// Faulty channels and stretches of the suspect logs, which `suspects` no longer contain.
   std::vector<LogFault> set_aside = {};
+  /// The same of `references`.
+  std::vector<BadChannel> set_aside_in_references = {};
   /// Jumps, which may be physics: in the order of the logs; and the logs without them, empty where a log has none.
   std::vector<LogFault> jumps = {};
   std::vector<MachineSignals> without_jumps = {};

@@ -138,7 +138,8 @@ std::string Diagnosis::table(const std::string& first_line) const {
     return out;
   }
   for (const BadChannel& b : set_aside)
-    out += fmt::format("  Set aside: {}\n", bad_channel_sentence(b));
+    out += fmt::format("  Set aside: {}{}\n", b.file.empty() ? "" : b.file + ": ",
+                       bad_channel_sentence(b));
   for (const ReferenceFault& f : reference_faults)
     out += fmt::format("  Check the references: {}\n", f.sentence());
   for (const DiagnosedEffect& e : effects) {
@@ -262,7 +263,8 @@ std::string Diagnosis::json() const {
   }
   j["set_aside"] = nlohmann::json::array();
   for (const BadChannel& b : set_aside) {
-    j["set_aside"].push_back({{"channel", b.channel},
+    j["set_aside"].push_back({{"file", b.file},
+                              {"channel", b.channel},
                               {"kind", bad_data_word(b.kind)},
                               {"from_s", b.from_s},
                               {"to_s", b.to_s},

@@ -1,6 +1,7 @@
 #include "diagnosis/verdict/reference_comparison.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -136,9 +137,8 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
           ? InReferences::kVaries
           : InReferences::kAlike;
   // what the residuals of all channels must prove is not proven by its size
-  const bool by_size = compared.proof != Proof::kClearExcess &&
-                       !(compared.chance < d.thresholds.difference_beyond_doubt);
-  if (by_size && !predicts_left_out(d, d.search.found[found])) return no_change;
+  if (compared.proof != Proof::kClearExcess && !predicts_left_out(d, d.search.found[found]))
+    return no_change;
   if (compared.proof == Proof::kNone) return compared.in_references;
   // Laws that are not exact have another size in other motions, and standard errors do not know how other. A difference that is
   // significant and no more is a change only where the suspect logs exceed the references without it.
@@ -173,6 +173,32 @@ std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOpti
   return there;
 }
 
+bool found_in_references(const CraneModel& model, const DiagnosisSignals& signals,
+                         DiagnoseOptions alone, const Diagnosis& d, std::size_t found) {
+  const FoundEffect& f = d.search.found[found];
+  const std::vector<AppliedEffect>& shared = d.evidence.options.shared;
+  const bool known = std::any_of(shared.begin(), shared.end(), [&](const AppliedEffect& e) {
+    return same_place(e, f.design.effect);
+  });
+  if (known || f.design.shape.empty()) return false;
+  alone.candidates = {f.design.effect};
+  alone.evidence.shared.clear();
+  const Diagnosis there = diagnose_sound(model, {signals.references}, alone, {});
+  const bool alike = std::any_of(
+      there.search.found.begin(), there.search.found.end(), [&](const FoundEffect& own) {
+        return own.design.effect == f.design.effect && within_intervals(applied_of(own), f);
+      });
+  if (tracing()) {
+    fmt::print(stderr, "  {} estimated from the references alone:",
+               effect_key(f.design.effect.effect->info(), model.machine, f.design.effect.at));
+    for (const FoundEffect& own : there.search.found)
+      fmt::print(stderr, " {:.4g}, 95 % from {:.4g} to {:.4g}", fmt::join(own.values, " "),
+                 fmt::join(own.lower95, " "), fmt::join(own.upper95, " "));
+    fmt::print(stderr, " {}\n", alike ? "(alike)" : "(not alike)");
+  }
+  return alike;
+}
+
 Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSignals& signals,
                                       const DiagnoseOptions& options,
                                       const SearchProgress& progress) {
@@ -204,8 +230,11 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
   for (int turn = 0; turn < now.verdict.shared_turns; ++turn) {
     d = diagnose_sound(with, signals, now, part(0.4, 1.0));
     bool again = false;
-    const std::vector<InReferences> all =
-        all_in_references(d, now.search, turn + 1 == now.verdict.shared_turns);
+    const bool last = turn + 1 == now.verdict.shared_turns;
+    std::vector<InReferences> all = all_in_references(d, now.search, last);
+    if (!last && std::none_of(all.begin(), all.end(), joins_both))
+      for (std::size_t i = 0; i < all.size(); ++i)
+        if (found_in_references(with, signals, alone, d, i)) all[i] = InReferences::kAlike;
     for (std::size_t i = 0; i < d.search.found.size(); ++i) {
       const FoundEffect& f = d.search.found[i];
       const bool shared = is_shared(d.evidence, f);

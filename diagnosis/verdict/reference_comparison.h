@@ -26,6 +26,14 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
 std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
                                             bool last);
 
+/// Whether a law of several parameters that the references' own diagnosis has left out, estimated from them alone, has the values
+/// that it has in the suspect logs. The size there of the law with the suspect logs' nonlinear parameters does not tell, because each
+/// log prefers parameters, and a variant, of its own.
+/// @param alone as for the references' own diagnosis; its candidates and what both logs have are not used
+/// @param found index into the effects found in `d`
+bool found_in_references(const CraneModel& model, const DiagnosisSignals& signals,
+                         DiagnoseOptions alone, const Diagnosis& d, std::size_t found);
+
 /// Diagnosis of suspect logs against references, in three steps: what the model lacks in the references alone; the
 /// difference of the suspect logs, with those effects estimated in all logs; and again, where an effect that was found
 /// as a difference is seen in the references as well.

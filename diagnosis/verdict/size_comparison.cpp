@@ -63,6 +63,20 @@ bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   });
 }
 
+bool within_intervals(const AppliedEffect& e, const FoundEffect& f) {
+  if (e.lower95.size() != e.values.size()) return false;
+  const std::vector<EffectParameter>& parameters = e.effect->info().parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    // Each log prefers a variant of the law as well; what one of them does not have cannot differ.
+    if (parameters[p].choice) continue;
+    if (is_absent(parameters[p], f.values[p]) || is_absent(parameters[p], e.values[p])) continue;
+    const double half =
+        std::hypot(0.5 * (e.upper95[p] - e.lower95[p]), 0.5 * (f.upper95[p] - f.lower95[p]));
+    if (!(std::abs(f.values[p] - e.values[p]) <= half)) return false;
+  }
+  return true;
+}
+
 namespace {
 
 /// Whether the references have the same effect with the same values, as far as both can tell: for every parameter the 95 %
@@ -71,20 +85,9 @@ namespace {
 /// size of the one law in the other log then says that they differ.
 bool within_intervals_of_references(const Evidence& evidence, const FoundEffect& f) {
   if (!is_replaced_when_changed(*f.design.effect.effect)) return false;
-  const std::vector<EffectParameter>& parameters = f.design.effect.effect->info().parameters;
   const std::vector<AppliedEffect>& all = evidence.options.shared;
   return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    if (!same_place(e, f.design.effect) || e.lower95.size() != e.values.size()) return false;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
-      if (parameters[p].choice) {  // another variant of the law
-        if (f.values[p] != e.values[p]) return false;
-        continue;
-      }
-      const double half =
-          std::hypot(0.5 * (e.upper95[p] - e.lower95[p]), 0.5 * (f.upper95[p] - f.lower95[p]));
-      if (!(std::abs(f.values[p] - e.values[p]) <= half)) return false;
-    }
-    return true;
+    return same_place(e, f.design.effect) && within_intervals(e, f);
   });
 }
 
@@ -306,8 +309,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return {significant(sizes.mean()) ? InReferences::kOther : InReferences::kVaries,
             taken_over              ? Proof::kClearExcess
             : certain(sizes.mean()) ? Proof::kNone
-                                    : Proof::kExcess,
-            chance(sizes.mean())};
+                                    : Proof::kExcess};
   const SizeInLogs &here = sizes.suspects, &there = sizes.references;
   // They take it over from all motions together, so that it may have no size in one group.
   const bool no_size =
@@ -340,7 +342,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (!significant(difference)) return {};
   return {
       significant(there.size / there.standard_error) ? InReferences::kOther : InReferences::kNot,
-      certain(difference) ? Proof::kNone : Proof::kExcess, chance(difference)};
+      certain(difference) ? Proof::kNone : Proof::kExcess};
 }
 
 }  // namespace sparflow

@@ -14,13 +14,15 @@ enum class Proof {
 struct SizeVerdict {
   InReferences in_references = InReferences::kAlike;
   Proof proof = Proof::kClearExcess;
-  double chance = 1.0;  ///< of sizes that differ so far; 1 where they are not compared
 };
 
 bool same_place(const AppliedEffect& a, const EffectAt& b);
 
 /// Whether the found effect's columns act in all logs already, so that it is a difference.
 bool is_shared(const Evidence& evidence, const FoundEffect& f);
+
+/// Whether two estimates of one law agree: for every parameter that both have, the 95 % interval of the difference contains zero.
+bool within_intervals(const AppliedEffect& e, const FoundEffect& f);
 
 /// Compares by a random-effects model, and beside it by the form error of the law. @param found index into the effects found
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options);

@@ -8,6 +8,7 @@
 
 #include "identification/comparison/compare_stages.h"
 #include "identification/comparison/report_numbers.h"
+#include "identification/data_checks/set_aside.h"
 #include "identification/signals/apply_effects.h"
 #include "models/math/error.h"
 #include "models/math/nan.h"
@@ -366,16 +367,17 @@ CompareResult join_results(const Machine& machine, std::vector<CompareResult> pa
 
 namespace {
 
-/// Makes the signals of a log and looks for its bad channels.
+/// Makes the signals of a log without what is faulty in it.
 void add_log(const CraneModel& model, const Log& log, const CompareOptions& options,
              std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>>& out) {
-  out.first.push_back(make_signals(model.machine, log, options.signals));
+  CheckedSignals checked =
+      checked_signals(model.machine, log, options.signals, options.bad_data, Jumps::kStay);
+  out.first.push_back(std::move(checked.signals));
   if (is_computed_motion(model.machine, log)) {
     out.first.back().notes.push_back(
         "the columns are those of a computed motion, so its channels are not judged as sensors");
   }
-  for (BadChannel& b : find_bad_channels(model.machine, log, out.first.back(), options.bad_data))
-    out.second.push_back({log.file, std::move(b)});
+  for (BadChannel& b : checked.bad) out.second.push_back({log.file, std::move(b)});
 }
 
 }  // namespace

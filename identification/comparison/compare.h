@@ -131,13 +131,14 @@ struct CompareResult {
   long samples = 0;
   std::vector<StageScore> scores;  ///< in the order of the stages, then of the machine
   std::vector<EnergyScore> energy;
-  ErrorRanking ranking;                   ///< by which all outputs name and order the errors
-  std::vector<WorstRegion> worst;         ///< in the order of the ranking
-  ResidualTests tests;                    ///< systematic errors, with controlled false alarms
-  StageAtFault fault;                     ///< split errors, and the stage at fault by the ranking
-  std::vector<RegimeError> regimes;       ///< errors by regime, with 95 % intervals
-  std::vector<WorstSegment> segments;     ///< motions with the largest errors, in that order
-  std::vector<BadChannelOfLog> bad_data;  ///< filled by `compare` only, which has the logs
+  ErrorRanking ranking;                ///< by which all outputs name and order the errors
+  std::vector<WorstRegion> worst;      ///< in the order of the ranking
+  ResidualTests tests;                 ///< systematic errors, with controlled false alarms
+  StageAtFault fault;                  ///< split errors, and the stage at fault by the ranking
+  std::vector<RegimeError> regimes;    ///< errors by regime, with 95 % intervals
+  std::vector<WorstSegment> segments;  ///< motions with the largest errors, in that order
+  /// Filled by `compare` and `fit`, which have the logs; all but jumps is set aside.
+  std::vector<BadChannelOfLog> bad_data;
   std::vector<SlipOfLog> slips;    ///< sensors connected or named wrongly, where regions are sought
   std::vector<std::string> notes;  ///< what was not compared, and why; whole sentences
   std::vector<LogComparison> logs;

@@ -403,7 +403,10 @@ std::string compare_table(const CompareResult& result) {
   if (!result.slips.empty()) text += "\nsensors that seem to be connected or named wrongly\n";
   for (const SlipOfLog& s : result.slips) text += wrapped(s.file + ": " + s.slip.sentence);
   if (!result.bad_data.empty())
-    text += "\nbad data: repair or leave out before learning from these logs\n";
+    text +=
+        "\nbad data, set aside here and in what is learned; jumps count here, because an effect "
+        "may "
+        "explain them\n";
   for (const BadChannelOfLog& b : result.bad_data)
     text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
   if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);

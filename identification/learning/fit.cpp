@@ -8,6 +8,7 @@
 #include <cmath>
 #include <span>
 
+#include "identification/data_checks/set_aside.h"
 #include "identification/learning/fit_pass.h"
 #include "identification/signals/apply_effects.h"
 #include "models/math/error.h"
@@ -78,23 +79,38 @@ FitPass learn(const Machine& machine, const std::vector<MachineSignals>& plain,
   return pass;
 }
 
-std::vector<MachineSignals> all_signals(const Machine& machine, const std::vector<Log>& logs,
-                                        const SignalOptions& options) {
-  std::vector<MachineSignals> out;
-  out.reserve(logs.size());
-  for (const Log& log : logs) out.push_back(make_signals(machine, log, options));
+/// Signals of all logs of one use, and what is faulty in them.
+struct LogSignals {
+  std::vector<MachineSignals> signals;
+  std::vector<BadChannelOfLog> bad;
+};
+
+void add_log(const Machine& machine, const Log& log, const FitOptions& options, Jumps jumps,
+             LogSignals& out) {
+  if (!options.check_data) {
+    out.signals.push_back(make_signals(machine, log, options.signals));
+    return;
+  }
+  CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, jumps);
+  out.signals.push_back(std::move(one.signals));
+  for (BadChannel& b : one.bad) out.bad.push_back({log.file, std::move(b)});
+}
+
+LogSignals all_signals(const Machine& machine, const std::vector<Log>& logs,
+                       const FitOptions& options, Jumps jumps) {
+  LogSignals out;
+  for (const Log& log : logs) add_log(machine, log, options, jumps, out);
   return out;
 }
 
 /// The same; each log is emptied when its signals are there.
-std::vector<MachineSignals> all_signals(const Machine& machine, std::vector<Log>&& logs,
-                                        const SignalOptions& options) {
-  std::vector<MachineSignals> out;
-  out.reserve(logs.size());
+LogSignals all_signals(const Machine& machine, std::vector<Log>&& logs, const FitOptions& options,
+                       Jumps jumps) {
+  LogSignals out;
   for (Log& log : logs) {
     const Log one = std::move(log);
     log = Log();
-    out.push_back(make_signals(machine, one, options));
+    add_log(machine, one, options, jumps, out);
   }
   return out;
 }
@@ -170,7 +186,7 @@ std::optional<CompareResult> judge_held_out(const Machine& machine,
 }
 
 struct FitInputs {
-  std::vector<MachineSignals> signals, tests;
+  LogSignals logs, tests;
   std::vector<DataSource> data;  ///< of both
 };
 
@@ -280,8 +296,8 @@ FitResult fit_signals(const Machine& machine, FitInputs inputs, const FitOptions
   const auto tell = [&](double share, const std::string& what) {
     if (progress) progress(share, what);
   };
-  std::vector<MachineSignals>& signals = inputs.signals;
-  const bool hold_out = inputs.tests.empty() && options.hold_out_every > 1;
+  std::vector<MachineSignals>& signals = inputs.logs.signals;
+  const bool hold_out = inputs.tests.signals.empty() && options.hold_out_every > 1;
   FitPass pass =
       learn(machine, signals, inside(signals), options, [&](double share, const std::string& what) {
         tell(0.05 + (hold_out ? 0.4 : 0.8) * share, what);
@@ -298,10 +314,12 @@ FitResult fit_signals(const Machine& machine, FitInputs inputs, const FitOptions
   give_back_memory();
   CompareOptions compare_options;
   compare_options.signals = options.signals;
-  if (!inputs.tests.empty()) {
-    result.test = compare_signals(pass.model, std::move(inputs.tests), {}, compare_options);
+  if (!inputs.tests.signals.empty()) {
+    result.test = compare_signals(pass.model, std::move(inputs.tests.signals), {}, compare_options);
+    result.test->bad_data = std::move(inputs.tests.bad);
   }
   result.train = compare_signals(pass.model, std::move(signals), {}, compare_options);
+  result.train.bad_data = std::move(inputs.logs.bad);
 
   result.model = std::move(pass.model);
   result.processes = std::move(pass.processes);
@@ -329,8 +347,8 @@ FitResult fit_logs(const Machine& machine, Logs&& logs, Logs&& test_logs, const 
   FitInputs inputs;
   inputs.data = sources(logs, "train");
   for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
-  inputs.signals = all_signals(machine, std::forward<Logs>(logs), options.signals);
-  inputs.tests = all_signals(machine, std::forward<Logs>(test_logs), options.signals);
+  inputs.logs = all_signals(machine, std::forward<Logs>(logs), options, Jumps::kSetAside);
+  inputs.tests = all_signals(machine, std::forward<Logs>(test_logs), options, Jumps::kStay);
   FitResult result = fit_signals(machine, std::move(inputs), options, progress);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;

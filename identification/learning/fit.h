@@ -17,6 +17,9 @@ namespace sparflow {
 
 struct FitOptions {
   SignalOptions signals;
+  /// Whether the logs' faulty channels and stretches are set aside.
+  bool check_data = true;
+  BadDataOptions bad_data;
   /// Physical effects of the model with fixed parameter values; pressure models, margins and gains are learned with their
   /// contributions subtracted.
   std::vector<AppliedEffect> effects;
@@ -75,7 +78,7 @@ struct ValveFit {
 
 struct FitResult {
   CraneModel model;
-  CompareResult train;
+  CompareResult train;                ///< with the bad data of these logs, which took no part
   std::optional<CompareResult> test;  ///< on the test logs
   std::optional<CompareResult>
       held_out;  ///< without test logs: on held-out blocks, by a model learned without them

@@ -117,6 +117,13 @@ std::string FitResult::full() const {
   text += "training logs:    " + figures(train) + "\n";
   if (held_out) text += "held-out motions: " + figures(*held_out) + "\n";
   if (test) text += "test logs:        " + figures(*test) + "\n";
+  for (const BadChannelOfLog& b : train.bad_data)
+    text += fmt::format("set aside: {}: {}\n", b.file, bad_channel_sentence(b.bad));
+  if (test)
+    for (const BadChannelOfLog& b : test->bad_data)
+      text += fmt::format("{}: {}: {}\n",
+                          b.bad.kind == BadDataKind::kJumping ? "bad data" : "set aside", b.file,
+                          bad_channel_sentence(b.bad));
   for (const std::string& note : notes) text += "note: " + note + "\n";
   return text + brief() + "\n";
 }

@@ -53,6 +53,7 @@ struct Change {
   const char* key;                 ///< of parameter_table.h; empty: the payload that the log tells
   double factor, plus;             ///< new value = factor * old + plus, in the table's unit
   std::vector<const char*> named;  ///< ids, each of them a right answer at the place
+  std::vector<const char*> beside = {};  ///< ids that are true beside one of these, not alone
 };
 
 const std::vector<Change>& changes() {
@@ -63,7 +64,8 @@ const std::vector<Change>& changes() {
        "coulomb_friction_N",
        2.5,
        0.0,
-       {"coulomb_friction", "presliding", "stribeck_friction"}},
+       {"coulomb_friction", "presliding"},
+       {"stribeck_friction"}},
       {"viscous_friction", "viscous_friction_N_s_m", 5.0, 0.0, {"viscous_friction"}},
       {"leakage", "leakage_lpm_100bar", 1.0, 1.5, {"leakage"}},
       {"line_loss", "line_drop_bar", 3.0, 5.0, {"line_loss"}},
@@ -145,10 +147,9 @@ Hidden drawn_change(const Machine& machine, const Arguments& a, Random& random) 
   return h;
 }
 
-/// Whether an effect, given as id:place, is a right answer to the hidden change.
-bool is_answer(const Hidden& hidden, const std::string& key) {
-  if (hidden.change == nullptr) return false;
-  return std::any_of(hidden.change->named.begin(), hidden.change->named.end(), [&](const char* id) {
+/// Whether an effect, given as id:place, is one of these ids at the place of the hidden change.
+bool is_one_of(const std::vector<const char*>& ids, const Hidden& hidden, const std::string& key) {
+  return std::any_of(ids.begin(), ids.end(), [&](const char* id) {
     if (key == id) return true;
     return key.rfind(std::string(id) + ":", 0) == 0 &&
            (hidden.at.empty() || key == std::string(id) + ":" + hidden.at);
@@ -157,11 +158,19 @@ bool is_answer(const Hidden& hidden, const std::string& key) {
 
 void judge(const Diagnosis& d, const Hidden& hidden, Case& c) {
   c.verdict = verdict_name(d.verdict);
-  c.said = said_effects(d, [&](const std::string& key) { return is_answer(hidden, key); });
   bool truth = false, untrue = false;
+  const auto named = [&](const std::string& key) {
+    return hidden.change != nullptr && is_one_of(hidden.change->named, hidden, key);
+  };
+  c.said = said_effects(d, named);
+  for (const SaidEffect& s : c.said) truth = truth || s.set_right;
+  if (truth)
+    c.said = said_effects(d, [&](const std::string& key) {
+      return named(key) || is_one_of(hidden.change->beside, hidden, key);
+    });
   for (const SaidEffect& s : c.said) {
     c.answer += s.key + " ";
-    (s.set_right ? truth : untrue) = true;
+    untrue = untrue || !s.set_right;
   }
   c.right = hidden.change != nullptr ? truth && !untrue : d.verdict == Verdict::kNone;
   if (d.verdict == Verdict::kUnknown && d.unexplained) c.answer += "? " + d.unexplained->sentence;

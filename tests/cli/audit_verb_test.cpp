@@ -1,9 +1,21 @@
 // The verb audit, as a user runs it.
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <sstream>
+
 #include "tests/cli/cli_fixture.h"
 #include "tests/parsed_json.h"
 
 namespace sparflow::test {
 namespace {
+
+std::vector<std::string> cells(const std::string& line) {
+  std::vector<std::string> out;
+  std::istringstream text(line);
+  for (std::string cell; std::getline(text, cell, ',');) out.push_back(cell);
+  return out;
+}
 
 const std::string kAudited = " --model " + kData + "/models/loader_crane.json";
 
@@ -80,6 +92,47 @@ TEST_F(Cli, AuditSaysWhatItCannotJudge) {
   EXPECT_EQ(rest.code, 3);
   EXPECT_THAT(rest.err, HasSubstr("no move of more than"));
   EXPECT_EQ(run("audit " + kTest).code, 2);
+}
+
+TEST_F(Cli, AuditSaysWhereDataIsBad) {
+  // the pump's sensor rests at one value for the middle third of the log
+  std::istringstream lines(slurp(kTest));
+  std::string line, kept, header, held;
+  std::getline(lines, header);
+  const std::vector<std::string> names = cells(header);
+  const auto column =
+      static_cast<std::size_t>(std::find(names.begin(), names.end(), "p_main_bar") - names.begin());
+  ASSERT_LT(column, names.size());
+  std::vector<std::vector<std::string>> rows;
+  while (std::getline(lines, line)) rows.push_back(cells(line));
+  kept = header + "\n";
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (k > rows.size() / 3 && k < 2 * rows.size() / 3)
+      rows[k][column] = rows[rows.size() / 3][column];
+    kept += fmt::format("{}\n", fmt::join(rows[k], ","));
+  }
+  write("stuck.csv", kept);
+  const Outcome o =
+      run("audit " + at("stuck.csv") + kAudited + " --moves 12 --no-bound --json " + at("a.json"));
+  ASSERT_EQ(o.code, 0) << o.err;
+  EXPECT_THAT(o.out, HasSubstr("Set aside in stuck.csv: p_main is stuck"));
+  const json a = test_support::parsed_json(slurp(at("a.json")));
+  const double from = std::stod(rows[rows.size() / 3][0]),
+               to = std::stod(rows[2 * rows.size() / 3][0]);
+  int inside = 0, outside = 0;
+  for (const json& m : a.at("moves")) {
+    const double first = m.at("t_s").at(0), last = m.at("t_s").at(1);
+    if (first > from && last < to) {
+      ++inside;
+      EXPECT_FALSE(m.at("judged").get<bool>()) << m;
+      EXPECT_THAT(m.at("reason").get<std::string>(), HasSubstr("Bad data in it: p_main is stuck"));
+    } else if (last < from || first > to) {
+      ++outside;
+      EXPECT_TRUE(m.at("judged").get<bool>()) << m;
+    }
+  }
+  EXPECT_GT(inside, 0);
+  EXPECT_GT(outside, 0);
 }
 
 }  // namespace

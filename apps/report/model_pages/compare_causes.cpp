@@ -21,7 +21,9 @@ void add_bad_data(Page& page, const CompareResult& result) {
   table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
   for (const BadChannelOfLog& b : result.bad_data)
     table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
-  table.note = "No model explains these channels; repair them or leave them out before learning.";
+  table.note =
+      "No model explains these channels. They take no part in the errors and in what is learned; "
+      "jumps take part in the errors, because an effect may explain them.";
   page.table(std::move(table));
 }
 

@@ -199,11 +199,11 @@ void add_bad_data(Page& page, const Diagnosis& d) {
   page.section("Bad data");
   Table table;
   table.title = "Channels with faults of sensor or recording";
-  table.columns = {
-      {"channel"},  {"kind"},      {"from", "s", 4}, {"to", "s", 4}, {"of the log", "%", 2},
-      {"evidence"}, {"what to do"}};
+  table.columns = {{"log"},          {"channel"},    {"kind"},
+                   {"from", "s", 4}, {"to", "s", 4}, {"of the log", "%", 2},
+                   {"evidence"},     {"what to do"}};
   for (const BadChannel& b : d.set_aside) {
-    table.rows.push_back({b.channel, std::string(bad_data_word(b.kind)), b.from_s, b.to_s,
+    table.rows.push_back({b.file, b.channel, std::string(bad_data_word(b.kind)), b.from_s, b.to_s,
                           100.0 * b.share, b.evidence, b.remedy});
   }
   page.table(std::move(table));

@@ -197,34 +197,41 @@ HeldOutGain by_refitting(const Evidence& e, const std::vector<const EffectDesign
   for (Index k = 0; k < x.cols(); ++k) {
     if (k != static_cast<Index>(index)) reduced.col(at++) = rows.col(k);
   }
-  std::vector<double> gains, by_stretch;
+  std::vector<double> gains, squares_of, products_of;
   for (int f = 0; f < folds; ++f) {
     std::vector<Index> in, out;
     for (std::size_t b = 0; b < c.blocks.size(); ++b) {
       for (Index i = c.blocks[b].first; i < c.blocks[b].last; ++i)
         (static_cast<int>(b) % folds == f ? out : in).push_back(i);
     }
-    const auto error = [&](const MatrixXd& all) -> VectorXd {  // squared, of every row
+    const auto residual = [&](const MatrixXd& all) -> VectorXd {  // of every row
       const VectorXd theta =
           least_squares(MatrixXd(all(in, Eigen::all)), VectorXd(rows.rightCols(1)(in, 0)));
-      return (rows.rightCols(1) - all * theta).array().square();
+      return rows.rightCols(1) - all * theta;
     };
-    const VectorXd gain = 0.5 * (error(reduced) - error(rows.leftCols(x.cols())));
-    gains.push_back(gain(out).sum());
+    const VectorXd without = residual(reduced), with = residual(rows.leftCols(x.cols()));
+    gains.push_back(0.5 * (without(out).squaredNorm() - with(out).squaredNorm()));
     for (std::size_t b = static_cast<std::size_t>(f); b < c.blocks.size();
-         b += static_cast<std::size_t>(folds))
-      by_stretch.push_back(
-          gain.segment(c.blocks[b].first, c.blocks[b].last - c.blocks[b].first).sum());
+         b += static_cast<std::size_t>(folds)) {
+      const Index first = c.blocks[b].first, length = c.blocks[b].last - first;
+      const VectorXd predicted = (without - with).segment(first, length);
+      squares_of.push_back(predicted.squaredNorm());
+      products_of.push_back(predicted.dot(without.segment(first, length)));
+    }
   }
   HeldOutGain g;
   double squares = 0.0;
   for (const double v : gains) g.gain += v;
   for (const double v : gains) squares += std::pow(v - g.gain / folds, 2);
   g.error = std::sqrt(squares * folds / (folds - 1.0));
-  const VectorXd each = Eigen::Map<VectorXd>(by_stretch.data(), std::ssize(by_stretch));
-  const auto count = static_cast<double>(each.size());
-  const double deviation = std::sqrt((each.array() - each.mean()).square().sum() / (count - 1.0));
-  g.chance = student_tail(each.mean() / deviation * std::sqrt(count), count - 1.0);
+  // weighted least squares of what is shown, over the square root of what is predicted
+  const auto stretches = std::ssize(squares_of);
+  const VectorXd root = Eigen::Map<VectorXd>(squares_of.data(), stretches).cwiseSqrt();
+  const VectorXd shown = Eigen::Map<VectorXd>(products_of.data(), stretches).cwiseQuotient(root);
+  const double slope = root.dot(shown) / root.squaredNorm(),
+               freedom = static_cast<double>(stretches) - 1.0;
+  const double variance = std::max(1.0, (shown - slope * root).squaredNorm() / freedom);
+  g.chance = student_tail((slope - 0.5) * root.norm() / std::sqrt(variance), freedom);
   return g;
 }
 

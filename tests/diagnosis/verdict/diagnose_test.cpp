@@ -267,6 +267,21 @@ TEST(Diagnose, APositionThatIsSetAsideForSecondsDoesNotStopTheLaws) {
   EXPECT_EQ(d.verdict, Verdict::kNone) << d.table();
 }
 
+TEST(Diagnose, AFaultInAReferenceIsSetAsideAndNamed) {
+  HiddenCase logs = hidden_case(crane(), {}, {kSeed, kSeconds});
+  const auto p = std::find_if(logs.reference.channels.begin(), logs.reference.channels.end(),
+                              [](const Channel& c) { return c.signal == "pA_jib"; });
+  ASSERT_NE(p, logs.reference.channels.end());
+  const Eigen::Index from = logs.reference.samples() / 3, count = logs.reference.samples() / 5;
+  p->values.segment(from, count).setConstant(p->values[from]);  // stuck for twenty seconds
+  const Diagnosis d = diagnose(reference_model(), {logs.train}, {logs.reference});
+  ASSERT_EQ(d.set_aside.size(), 1u) << d.table();
+  EXPECT_EQ(d.set_aside.front().channel, "pA_jib");
+  EXPECT_EQ(d.set_aside.front().file, logs.reference.file);
+  EXPECT_EQ(d.verdict, Verdict::kNone) << d.table();
+  EXPECT_THAT(d.table(), HasSubstr("Set aside: " + logs.reference.file + ": pA_jib"));
+}
+
 TEST(Diagnose, ARipplingPositionIsSetAsideInItsStretch) {
   HiddenCase logs = hidden_case(crane(), {}, {kSeed, kSeconds});
   EXPECT_TRUE(diagnosis_signals(crane(), {logs.train}, {}, {}).set_aside.empty());

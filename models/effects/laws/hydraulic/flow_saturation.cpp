@@ -112,10 +112,12 @@ class FlowSaturation final : public Effect {
       return false;
     const Form form = shape.size() > 1 ? static_cast<Form>(std::lround(shape[1])) : Form::kShared;
     const Demand demand(log, at, shape[0], form);
-    if (!demand.known || (form == Form::kByLine && !has_line(log, at))) return false;
+    if (!demand.known) return false;
     columns.setZero(log.samples(), 2);
     if (pump && form == Form::kByLine) {
-      columns.col(0) = lost_by_line(log, at, shape[0]);
+      const Eigen::VectorXd lost = lost_by_line(log, at, shape[0]);
+      if (lost.size() == 0) return false;
+      columns.col(0) = lost;
       return !columns.isZero(0.0);
     }
     if (pump && demand.lost.size() > 0) {
