@@ -114,14 +114,9 @@ bool joins_both(InReferences there) {
   return there == InReferences::kAlike || there == InReferences::kVaries;
 }
 
-/// Whether a difference to a law of the references improves the prediction of motions left out, at the level of the sizes' difference. A law
-/// that is not exact has another size in other motions, by a few of them. One that the references do not have has no such share.
+/// Whether a difference improves the prediction of motions left out, at the level of the sizes' difference. A law that is not exact
+/// has another size in other motions, by a few of them.
 bool predicts_left_out(const Diagnosis& d, const FoundEffect& f) {
-  const std::vector<AppliedEffect>& all = d.evidence.options.shared;
-  const bool known = std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    return same_place(e, f.design.effect);
-  });
-  if (!known) return true;
   if (tracing())
     fmt::print(stderr, "    gain on motions left out {:.4g} +- {:.2g} nats, by chance {:.2g}\n",
                f.held_out, f.held_out_error, f.held_out_chance);
@@ -186,7 +181,7 @@ bool found_in_references(const CraneModel& model, const DiagnosisSignals& signal
   const Diagnosis there = diagnose_sound(model, {signals.references}, alone, {});
   const bool alike = std::any_of(
       there.search.found.begin(), there.search.found.end(), [&](const FoundEffect& own) {
-        return own.design.effect == f.design.effect && within_intervals(applied_of(own), f);
+        return own.design.effect == f.design.effect && agree(applied_of(own), d, f);
       });
   if (tracing()) {
     fmt::print(stderr, "  {} estimated from the references alone:",

@@ -63,31 +63,36 @@ bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   });
 }
 
-bool within_intervals(const AppliedEffect& e, const FoundEffect& f) {
+bool agree(const AppliedEffect& e, const Diagnosis& d, const FoundEffect& f) {
   if (e.lower95.size() != e.values.size()) return false;
   const std::vector<EffectParameter>& parameters = e.effect->info().parameters;
+  double tests = 0.0, least = 1.0;
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     // Each log prefers a variant of the law as well; what one of them does not have cannot differ.
     if (parameters[p].choice) continue;
     if (is_absent(parameters[p], f.values[p]) || is_absent(parameters[p], e.values[p])) continue;
-    const double half =
-        std::hypot(0.5 * (e.upper95[p] - e.lower95[p]), 0.5 * (f.upper95[p] - f.lower95[p]));
-    if (!(std::abs(f.values[p] - e.values[p]) <= half)) return false;
+    /// Half width of a 95 % interval. [standard deviations]
+    constexpr double kNormal95 = 1.959964;  // no threshold: of the normal distribution
+    const double deviation = std::hypot(0.5 * (e.upper95[p] - e.lower95[p]) / kNormal95,
+                                        0.5 * (f.upper95[p] - f.lower95[p]) / kNormal95);
+    const double z = std::abs(f.values[p] - e.values[p]) / std::max(deviation, 1e-300);
+    least = std::min(least, std::erfc(z / std::numbers::sqrt2));
+    tests += 1.0;
   }
-  return true;
+  tests *= static_cast<double>(d.search.found.size());
+  return tests * least >= d.thresholds.difference_false_alarm || tests == 0.0;
 }
 
 namespace {
 
-/// Whether the references have the same effect with the same values, as far as both can tell: for every parameter the 95 %
-/// interval of the difference contains zero. Only of effects that another value replaces; of others the found values are the
-/// difference itself. Each log prefers a nonlinear parameter of its own (the length of a rope by the phase of every swing), and the
-/// size of the one law in the other log then says that they differ.
-bool within_intervals_of_references(const Evidence& evidence, const FoundEffect& f) {
+/// Whether the references have the same effect with the same values, as far as both can tell. Only of effects that another value
+/// replaces; of others the found values are the difference itself. Each log prefers a nonlinear parameter of its own (the length of a
+/// rope by the phase of every swing), and the size of the one law in the other log then says that they differ.
+bool agrees_with_references(const Diagnosis& d, const FoundEffect& f) {
   if (!is_replaced_when_changed(*f.design.effect.effect)) return false;
-  const std::vector<AppliedEffect>& all = evidence.options.shared;
+  const std::vector<AppliedEffect>& all = d.evidence.options.shared;
   return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    return same_place(e, f.design.effect) && within_intervals(e, f);
+    return same_place(e, f.design.effect) && agree(e, d, f);
   });
 }
 
@@ -270,7 +275,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   if (stretches_of(d.evidence, d.search.found[found].design) <= d.search.found[found].design.linear)
     return {InReferences::kVaries, Proof::kClearExcess};
   const bool shared = is_shared(d.evidence, d.search.found[found]);
-  if (!shared && within_intervals_of_references(d.evidence, d.search.found[found])) return {};
+  if (!shared && agrees_with_references(d, d.search.found[found])) return {};
   const EffectDesign& suspect = d.search.found[found].design;
   EffectDesign reference = design_in(d.evidence, suspect, ActingLogs::kReferences);
   if (shared)

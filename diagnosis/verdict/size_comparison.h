@@ -21,8 +21,9 @@ bool same_place(const AppliedEffect& a, const EffectAt& b);
 /// Whether the found effect's columns act in all logs already, so that it is a difference.
 bool is_shared(const Evidence& evidence, const FoundEffect& f);
 
-/// Whether two estimates of one law agree: for every parameter that both have, the 95 % interval of the difference contains zero.
-bool within_intervals(const AppliedEffect& e, const FoundEffect& f);
+/// Whether an estimate of a law agrees with a found one: no parameter that both have differs significantly, by the level of sizes that
+/// differ and Bonferroni's bound over these parameters and all effects found.
+bool agree(const AppliedEffect& e, const Diagnosis& d, const FoundEffect& f);
 
 /// Compares by a random-effects model, and beside it by the form error of the law. @param found index into the effects found
 SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& options);
