@@ -135,6 +135,17 @@ TEST(FitPageInBrowser, EveryFigureIsDrawn) {
   expect_compare_page_good(page, "fit page");
 }
 
+TEST(FitPage, TellsWhichStretchesTookNoPart) {
+  Log log = testing_support::arm_log(0.3, 1);
+  Eigen::VectorXd& x = testing_support::channel(log, "pA_arm").values;
+  x.segment(1000, 500).setConstant(x[1000]);
+  const std::string html =
+      fit_page(fit(testing_support::arm_machine(), {log}, {testing_support::arm_log(0.3, 2)}))
+          .html();
+  EXPECT_THAT(html, HasSubstr("Faulty stretches took no part: pA_arm of arm.csv."));
+  EXPECT_THAT(html, HasSubstr("pA_arm is stuck between 20.0 and"));
+}
+
 TEST(FitPage, NamesPressureModelsThatWereNotIdentified) {
   Log log = arm_log(kNoise);
   testing_support::remove_channel(log, "pB_arm");

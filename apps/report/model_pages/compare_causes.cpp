@@ -14,19 +14,6 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-void add_bad_data(Page& page, const CompareResult& result) {
-  if (result.bad_data.empty()) return;
-  Table table;
-  table.title = "Bad data";
-  table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
-  for (const BadChannelOfLog& b : result.bad_data)
-    table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
-  table.note =
-      "No model explains these channels. They take no part in the errors and in what is learned; "
-      "jumps take part in the errors, because an effect may explain them.";
-  page.table(std::move(table));
-}
-
 /// Appends own and inherited error as shares of the measured variance, so that kN and bar can be compared. The shares
 /// are of squared errors, because squares of independent errors add up and RMS errors do not.
 void add_stages(Page& page, const CompareResult& result) {
@@ -175,6 +162,19 @@ void add_segments(Page& page, const CompareResult& result) {
 }
 
 }  // namespace
+
+void add_bad_data(Page& page, const CompareResult& result) {
+  if (result.bad_data.empty()) return;
+  Table table;
+  table.title = "Bad data";
+  table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
+  for (const BadChannelOfLog& b : result.bad_data)
+    table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
+  table.note =
+      "No model explains these channels. They take no part in the errors and in what is learned; "
+      "jumps take part in the errors, because an effect may explain them.";
+  page.table(std::move(table));
+}
 
 void add_causes(Page& page, const Machine& machine, const CompareResult& result,
                 const std::string& heading_prefix) {

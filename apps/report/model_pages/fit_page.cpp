@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "apps/report/model_pages/compare_causes.h"
 #include "apps/report/model_pages/compare_charts.h"
 #include "apps/report/model_pages/compare_page.h"
 #include "models/files/model_file.h"
@@ -206,6 +207,13 @@ void set_verdict(Page& page, const FitResult& r) {
     for (const std::string& n : r.model.missing()) names += (names.empty() ? "" : ", ") + n;
     text += " Missing: " + names + "; the notes name the motions to record.";
   }
+  if (!r.train.bad_data.empty()) {
+    tone = std::max(tone, Tone::kWarning);
+    std::string names;
+    for (const BadChannelOfLog& b : r.train.bad_data)
+      names += fmt::format("{}{} of {}", names.empty() ? "" : ", ", b.bad.channel, b.file);
+    text += " Faulty stretches took no part: " + names + ".";
+  }
   page.verdict(all == 0 ? Tone::kNeutral : tone, headline, text);
 }
 
@@ -216,6 +224,7 @@ void add_fit(Page& page, const FitResult& result) {
   add_processes(page, result);
   add_supplies(page, result);
   add_valves(page, result);
+  if (&judged_on(result) != &result.train) add_bad_data(page, result.train);
   for (const std::string& note : result.notes) page.paragraph(note);
   add_pressures(page, result, "Identified pressures");
 }
