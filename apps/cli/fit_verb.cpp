@@ -68,6 +68,8 @@ int run(const FitArguments& a) {
   try {
     check_learned(result, a.logs.size() == 1 ? a.logs.front() : "");
   } catch (const InputError&) {
+    for (const BadChannelOfLog& b : result.train.bad_data)
+      note(fmt::format("  set aside: {}: {}", b.file, bad_channel_sentence(b.bad)));
     for (const std::string& n : result.notes) note("  " + n);
     throw;
   }

@@ -42,6 +42,15 @@ struct Found {
   RecordedMove move;
 };
 
+/// The first fault found in the logs as a further sentence; empty without one.
+std::string first_fault(const std::vector<CheckedLog>& logs) {
+  for (const CheckedLog& log : logs)
+    if (!log.bad.empty())
+      return fmt::format(". Set aside in {}: {}", log.signals.file,
+                         bad_channel_sentence(log.bad.front().second));
+  return {};
+}
+
 /// Why a quantity is missing in a move: a channel with one of these roles is faulty there, or the log lacks it.
 std::string lacks(const Found& f, const std::string& what, const std::vector<Role>& roles) {
   const Eigen::VectorXd& t = f.log->signals.time;
@@ -243,8 +252,8 @@ AuditResult audit_task(const CraneModel& model, std::vector<Log>&& logs, const A
   if (found.empty())
     throw InputError({first, 0, 0}, "",
                      fmt::format("no move of more than {:.2g} m of the rods together was found in "
-                                 "{:.0f} s",
-                                 task.cutting.least_way, result.seconds));
+                                 "{:.0f} s{}",
+                                 task.cutting.least_way, result.seconds, first_fault(checked)));
   examine_all(model, found, task, listener, result);
   return result;
 }

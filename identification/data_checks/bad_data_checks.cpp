@@ -167,6 +167,37 @@ std::optional<Finding> constant_throughout(const CheckContext& context, std::siz
   return found;
 }
 
+/// The same for the pressure of a load-sensing pump, whose cylinders move and rest.
+std::optional<Finding> pump_constant_throughout(const CheckContext& context, std::size_t channel) {
+  const Channel& c = *context.channels[channel].channel;
+  if (c.role != Role::kPumpPressure) return {};
+  const Pump& pump = context.machine.pumps[static_cast<std::size_t>(c.index)];
+  const VectorXd known = finite_values(c.values);
+  if (pump.type != PumpType::kLoadSensing || known.size() == 0 ||
+      known.maxCoeff() != known.minCoeff())
+    return {};
+  double moves = 0.0, rests = 0.0;
+  for (Index k = 0; k < context.log.samples(); ++k) {
+    const bool any = std::any_of(pump.feeds.begin(), pump.feeds.end(), [&](int i) {
+      return static_cast<bool>(context.signals.cylinders[static_cast<std::size_t>(i)].moving[k]);
+    });
+    (any ? moves : rests) += context.log.step;
+  }
+  if (std::min(moves, rests) < context.options.stuck_s) return {};
+  Finding found;
+  found.kind = known[0] == 0.0 ? BadDataKind::kDropOut : BadDataKind::kStuck;
+  found.affected = c.values.array().isFinite();
+  found.evidence = fmt::format(
+      "it is {} in the whole log, while cylinders of this load-sensing pump move for {:.0f} s and "
+      "all "
+      "rest for {:.0f} s",
+      in_field(context.channels[channel], known[0]), moves, rests);
+  found.remedy =
+      "Check that the sensor is connected, remove the column from the log, or write type: "
+      "constant_pressure if the supply is one";
+  return found;
+}
+
 }  // namespace
 
 std::string in_field(const CheckedChannel& channel, double value) {
@@ -298,6 +329,7 @@ std::optional<Finding> check_stuck(const CheckContext& context, std::size_t chan
   const Role role = c.channel->role;
   if (role == Role::kCommand || role == Role::kPayload) return {};  // constant by nature
   if (std::optional<Finding> whole = constant_throughout(context, channel)) return whole;
+  if (std::optional<Finding> whole = pump_constant_throughout(context, channel)) return whole;
   const VectorXd& values = c.channel->values;
   const Mask state = driven(context, c);
   const std::vector<SampleRange> stretches = constant_stretches(values, context.log);

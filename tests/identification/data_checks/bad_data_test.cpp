@@ -135,6 +135,18 @@ TEST(BadData, AChannelThatNeverChangesWhileItsCylinderMovesIsFound) {
   EXPECT_EQ(bad[0].share, 1.0);
 }
 
+TEST(BadData, APumpThatNeverChangesIsStuckUnlessItIsAConstantSupply) {
+  Log log = noisy_arm();
+  channel(log, "p_main").values.setConstant(120.0 * kBar);
+  const std::vector<BadChannel> bad = bad_of(arm_machine(), log);
+  ASSERT_THAT(names(bad), ElementsAre("p_main stuck"));
+  EXPECT_EQ(bad[0].share, 1.0);
+  EXPECT_THAT(bad[0].remedy, HasSubstr("constant_pressure"));
+  Machine constant = arm_machine();
+  constant.pumps[0].type = PumpType::kConstantPressure;
+  EXPECT_THAT(names(bad_of(constant, log)), IsEmpty());
+}
+
 TEST(BadData, JumpsThatReturnAreFound) {
   for (const char* signal : {"pA_arm", "p_main"}) {
     Log log = noisy_arm();
