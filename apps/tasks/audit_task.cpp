@@ -26,7 +26,7 @@ struct CheckedLog {
 };
 
 CheckedLog checked_log(const Machine& machine, const Log& log) {
-  CheckedSignals checked = checked_signals(machine, log, {}, {}, Jumps::kSetAside);
+  CheckedSignals checked = checked_signals(machine, log, {}, {}, Staying::kNothing);
   CheckedLog out{std::move(checked.signals), {}};
   for (BadChannel& b : checked.bad) {
     const auto channel = std::find_if(log.channels.begin(), log.channels.end(),

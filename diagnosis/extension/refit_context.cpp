@@ -22,10 +22,10 @@ std::vector<MachineSignals> signals_of(const Machine& machine, const std::vector
       continue;
     }
     CheckedSignals one =
-        checked_signals(machine, log, options.signals, options.bad_data, Jumps::kStay);
+        checked_signals(machine, log, options.signals, options.bad_data, Staying::kJumps);
     out.push_back(std::move(one.signals));
     for (const BadChannel& b : one.bad)
-      if (b.kind != BadDataKind::kJumping)
+      if (!stays(b, Staying::kJumps))
         notes.push_back(fmt::format("set aside: {}: {}", log.file, bad_channel_sentence(b)));
   }
   return out;

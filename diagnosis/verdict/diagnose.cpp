@@ -414,10 +414,10 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
       continue;
     }
     CheckedSignals one =
-        checked_signals(machine, log, options.signals, options.bad_data, Jumps::kStay);
+        checked_signals(machine, log, options.signals, options.bad_data, Staying::kJumps);
     out.references.push_back(std::move(one.signals));
     for (BadChannel& b : one.bad)
-      if (b.kind != BadDataKind::kJumping) out.set_aside_in_references.push_back(std::move(b));
+      if (!stays(b, Staying::kJumps)) out.set_aside_in_references.push_back(std::move(b));
   }
   return out;
 }

@@ -370,8 +370,8 @@ namespace {
 /// Makes the signals of a log without what is faulty in it.
 void add_log(const CraneModel& model, const Log& log, const CompareOptions& options,
              std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>>& out) {
-  CheckedSignals checked =
-      checked_signals(model.machine, log, options.signals, options.bad_data, Jumps::kStay);
+  CheckedSignals checked = checked_signals(model.machine, log, options.signals, options.bad_data,
+                                           Staying::kJumpsAndRipples);
   out.first.push_back(std::move(checked.signals));
   if (is_computed_motion(model.machine, log)) {
     out.first.back().notes.push_back(

@@ -404,9 +404,8 @@ std::string compare_table(const CompareResult& result) {
   for (const SlipOfLog& s : result.slips) text += wrapped(s.file + ": " + s.slip.sentence);
   if (!result.bad_data.empty())
     text +=
-        "\nbad data, set aside here and in what is learned; jumps count here, because an effect "
-        "may "
-        "explain them\n";
+        "\nbad data, set aside here and in what is learned; jumps (an effect may explain them) and "
+        "ripples of a position count here\n";
   for (const BadChannelOfLog& b : result.bad_data)
     text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
   if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);

@@ -29,14 +29,18 @@ Log without_bad_data(Log log, const std::vector<BadChannel>& bad) {
   return log;
 }
 
+bool stays(const BadChannel& bad, Staying staying) {
+  return (bad.kind == BadDataKind::kJumping && staying != Staying::kNothing) ||
+         (bad.kind == BadDataKind::kRippling && staying == Staying::kJumpsAndRipples);
+}
+
 CheckedSignals checked_signals(const Machine& machine, const Log& log, const SignalOptions& signals,
-                               const BadDataOptions& bad_data, Jumps jumps) {
+                               const BadDataOptions& bad_data, Staying staying) {
   CheckedSignals out;
   out.signals = make_signals(machine, log, signals);
   out.bad = find_bad_channels(machine, log, out.signals, bad_data);
   std::vector<BadChannel> aside = out.bad;
-  if (jumps == Jumps::kStay)
-    std::erase_if(aside, [](const BadChannel& b) { return b.kind == BadDataKind::kJumping; });
+  std::erase_if(aside, [&](const BadChannel& b) { return stays(b, staying); });
   if (!aside.empty()) out.signals = make_signals(machine, without_bad_data(log, aside), signals);
   return out;
 }

@@ -11,20 +11,24 @@ namespace sparflow {
 /// does not reach across a hole. Other channels stay as they are.
 Log without_bad_data(Log log, const std::vector<BadChannel>& bad);
 
-/// What is done with jumps of a single channel, which come from its sensor or from physics that a model lacks (a late pump).
-enum class Jumps {
-  kStay,     ///< where a model is judged, because an effect may explain them
-  kSetAside  ///< where static laws are learned, which contain no jumps in either case
+/// Faults that stay in the signals.
+enum class Staying {
+  kNothing,  ///< where laws are learned
+  kJumps,  ///< of a single channel, where effects are sought: a late pump jumps as well as a sensor
+  kJumpsAndRipples  ///< where errors are stated: a ripple of millimetres falsifies speeds, and hardly a static force
 };
 
 /// Signals of a log without what the data checks found faulty in it.
 struct CheckedSignals {
   MachineSignals signals;
-  std::vector<BadChannel> bad;  ///< all that was found, jumps that stay included
+  std::vector<BadChannel> bad;  ///< all that was found, also what stays
 };
+
+/// Whether a fault stays.
+bool stays(const BadChannel& bad, Staying staying);
 
 /// @throws InputError as make_signals
 CheckedSignals checked_signals(const Machine& machine, const Log& log, const SignalOptions& signals,
-                               const BadDataOptions& bad_data, Jumps jumps);
+                               const BadDataOptions& bad_data, Staying staying);
 
 }  // namespace sparflow

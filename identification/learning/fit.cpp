@@ -85,32 +85,32 @@ struct LogSignals {
   std::vector<BadChannelOfLog> bad;
 };
 
-void add_log(const Machine& machine, const Log& log, const FitOptions& options, Jumps jumps,
+void add_log(const Machine& machine, const Log& log, const FitOptions& options, Staying staying,
              LogSignals& out) {
   if (!options.check_data) {
     out.signals.push_back(make_signals(machine, log, options.signals));
     return;
   }
-  CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, jumps);
+  CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, staying);
   out.signals.push_back(std::move(one.signals));
   for (BadChannel& b : one.bad) out.bad.push_back({log.file, std::move(b)});
 }
 
 LogSignals all_signals(const Machine& machine, const std::vector<Log>& logs,
-                       const FitOptions& options, Jumps jumps) {
+                       const FitOptions& options, Staying staying) {
   LogSignals out;
-  for (const Log& log : logs) add_log(machine, log, options, jumps, out);
+  for (const Log& log : logs) add_log(machine, log, options, staying, out);
   return out;
 }
 
 /// The same; each log is emptied when its signals are there.
 LogSignals all_signals(const Machine& machine, std::vector<Log>&& logs, const FitOptions& options,
-                       Jumps jumps) {
+                       Staying staying) {
   LogSignals out;
   for (Log& log : logs) {
     const Log one = std::move(log);
     log = Log();
-    add_log(machine, one, options, jumps, out);
+    add_log(machine, one, options, staying, out);
   }
   return out;
 }
@@ -347,8 +347,9 @@ FitResult fit_logs(const Machine& machine, Logs&& logs, Logs&& test_logs, const 
   FitInputs inputs;
   inputs.data = sources(logs, "train");
   for (DataSource& d : sources(test_logs, "test")) inputs.data.push_back(std::move(d));
-  inputs.logs = all_signals(machine, std::forward<Logs>(logs), options, Jumps::kSetAside);
-  inputs.tests = all_signals(machine, std::forward<Logs>(test_logs), options, Jumps::kStay);
+  inputs.logs = all_signals(machine, std::forward<Logs>(logs), options, Staying::kNothing);
+  inputs.tests =
+      all_signals(machine, std::forward<Logs>(test_logs), options, Staying::kJumpsAndRipples);
   FitResult result = fit_signals(machine, std::move(inputs), options, progress);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "identification/comparison/report_numbers.h"
+#include "identification/data_checks/set_aside.h"
 #include "identification/learning/fit.h"
 #include "models/math/units.h"
 
@@ -122,8 +123,8 @@ std::string FitResult::full() const {
   if (test)
     for (const BadChannelOfLog& b : test->bad_data)
       text += fmt::format("{}: {}: {}\n",
-                          b.bad.kind == BadDataKind::kJumping ? "bad data" : "set aside", b.file,
-                          bad_channel_sentence(b.bad));
+                          stays(b.bad, Staying::kJumpsAndRipples) ? "bad data" : "set aside",
+                          b.file, bad_channel_sentence(b.bad));
   for (const std::string& note : notes) text += "note: " + note + "\n";
   return text + brief() + "\n";
 }

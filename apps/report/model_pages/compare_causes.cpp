@@ -172,7 +172,8 @@ void add_bad_data(Page& page, const CompareResult& result) {
     table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
   table.note =
       "No model explains these channels. They take no part in the errors and in what is learned; "
-      "jumps take part in the errors, because an effect may explain them.";
+      "jumps take part in the errors, because an effect may explain them, and so do ripples of a "
+      "position, which hardly change a static force.";
   page.table(std::move(table));
 }
 

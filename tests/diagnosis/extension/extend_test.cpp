@@ -239,7 +239,7 @@ TEST(Improve, WhatTheDataChecksSetAsideTakesPartInNoEstimate) {
   std::normal_distribution<double> normal(0.0, 10e5);
   for (Eigen::Index k = from; k < from + count; ++k) pressure[k] += normal(random);
   const ExtendResult r = improve(ignorant_model(), logs);
-  EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("set aside: pA_arm")));
+  EXPECT_THAT(r.notes, ::testing::Contains(HasSubstr("set aside: arm.csv: pA_arm is noisy")));
   const ExtendResult sound = improve(ignorant_model(), logs_with_friction());
   ASSERT_EQ(r.model.effects.size(), sound.model.effects.size()) << r.stopped_because;
   for (std::size_t i = 0; i < sound.model.effects.size(); ++i) {

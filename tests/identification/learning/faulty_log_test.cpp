@@ -57,8 +57,8 @@ TEST(FaultyLog, JumpsStayWhereAModelIsJudgedOnly) {
   for (const Eigen::Index at : {600, 1300, 2200})
     channel(log, "pA_arm").values.segment(at, 40).array() += 40.0 * units::kBar;
   const BadDataOptions options;
-  const CheckedSignals stay = checked_signals(arm_machine(), log, {}, options, Jumps::kStay),
-                       aside = checked_signals(arm_machine(), log, {}, options, Jumps::kSetAside);
+  const CheckedSignals stay = checked_signals(arm_machine(), log, {}, options, Staying::kJumps),
+                       aside = checked_signals(arm_machine(), log, {}, options, Staying::kNothing);
   ASSERT_EQ(stay.bad.size(), 1U);
   EXPECT_EQ(stay.bad[0].kind, BadDataKind::kJumping);
   ASSERT_EQ(aside.bad.size(), 1U);
