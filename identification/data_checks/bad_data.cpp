@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "identification/data_checks/bad_data_checks.h"
+#include "identification/data_checks/sensor_slips.h"
 #include "models/machine/linkage.h"
 #include "models/math/units.h"
 
@@ -150,6 +151,18 @@ void keep_position_only(const CheckContext& context, std::vector<BadChannel>& ba
   });
 }
 
+/// Removes the noise of channels that are in another unit, whose noise cannot be compared with that of their peers.
+void leave_other_units(const Machine& machine, const MachineSignals& signals,
+                       std::vector<BadChannel>& bad) {
+  const auto noisy = [](const BadChannel& b) { return b.kind == BadDataKind::kNoisy; };
+  if (std::none_of(bad.begin(), bad.end(), noisy)) return;
+  for (const SensorSlip& slip : find_sensor_slips(machine, signals))
+    std::erase_if(bad, [&](const BadChannel& b) {
+      return noisy(b) && std::find(slip.channels.begin(), slip.channels.end(), b.channel) !=
+                             slip.channels.end();
+    });
+}
+
 }  // namespace
 
 const char* bad_data_word(BadDataKind kind) {
@@ -220,6 +233,7 @@ std::vector<BadChannel> find_bad_channels(const Machine& machine, const Log& log
     }
   }
   keep_position_only(context, out);
+  leave_other_units(machine, signals, out);
   std::stable_sort(out.begin(), out.end(),
                    [](const BadChannel& a, const BadChannel& b) { return a.share > b.share; });
   return out;
