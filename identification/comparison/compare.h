@@ -137,7 +137,7 @@ struct CompareResult {
   StageAtFault fault;                  ///< split errors, and the stage at fault by the ranking
   std::vector<RegimeError> regimes;    ///< errors by regime, with 95 % intervals
   std::vector<WorstSegment> segments;  ///< motions with the largest errors, in that order
-  /// Filled by `compare` and `fit`, which have the logs; all but jumps is set aside.
+  /// Filled by `compare` and `fit`, which have the logs; what of it stays in the errors: Staying.
   std::vector<BadChannelOfLog> bad_data;
   std::vector<SlipOfLog> slips;    ///< sensors connected or named wrongly, where regions are sought
   std::vector<std::string> notes;  ///< what was not compared, and why; whole sentences
