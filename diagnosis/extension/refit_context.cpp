@@ -17,15 +17,11 @@ std::vector<MachineSignals> signals_of(const Machine& machine, const std::vector
   std::vector<MachineSignals> out;
   out.reserve(logs.size());
   for (const Log& log : logs) {
-    if (!options.check_data) {
-      out.push_back(make_signals(machine, log, options.signals));
-      continue;
-    }
-    CheckedSignals one =
-        checked_signals(machine, log, options.signals, options.bad_data, Staying::kJumps);
+    const Staying staying = options.check_data ? Staying::kJumps : Staying::kAll;
+    CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, staying);
     out.push_back(std::move(one.signals));
     for (const BadChannel& b : one.bad)
-      if (!stays(b, Staying::kJumps))
+      if (!stays(b, staying))
         notes.push_back(fmt::format("set aside: {}: {}", log.file, bad_channel_sentence(b)));
   }
   return out;

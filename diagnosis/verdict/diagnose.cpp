@@ -409,15 +409,11 @@ DiagnosisSignals diagnosis_signals(const Machine& machine, const std::vector<Log
     for (BadChannel& b : jumps) out.jumps.push_back({i, std::move(b)});
   }
   for (const Log& log : references) {
-    if (!options.check_data) {
-      out.references.push_back(make_signals(machine, log, options.signals));
-      continue;
-    }
-    CheckedSignals one =
-        checked_signals(machine, log, options.signals, options.bad_data, Staying::kJumps);
+    const Staying staying = options.check_data ? Staying::kJumps : Staying::kAll;
+    CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, staying);
     out.references.push_back(std::move(one.signals));
     for (BadChannel& b : one.bad)
-      if (!stays(b, Staying::kJumps)) out.set_aside_in_references.push_back(std::move(b));
+      if (!stays(b, staying)) out.set_aside_in_references.push_back(std::move(b));
   }
   return out;
 }

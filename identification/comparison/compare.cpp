@@ -370,14 +370,18 @@ namespace {
 /// Makes the signals of a log without what is faulty in it.
 void add_log(const CraneModel& model, const Log& log, const CompareOptions& options,
              std::pair<std::vector<MachineSignals>, std::vector<BadChannelOfLog>>& out) {
-  CheckedSignals checked = checked_signals(model.machine, log, options.signals, options.bad_data,
-                                           Staying::kJumpsAndRipples);
+  constexpr Staying kInErrors = Staying::kJumpsAndRipples;
+  CheckedSignals checked =
+      checked_signals(model.machine, log, options.signals, options.bad_data, kInErrors);
   out.first.push_back(std::move(checked.signals));
   if (is_computed_motion(model.machine, log)) {
     out.first.back().notes.push_back(
         "the columns are those of a computed motion, so its channels are not judged as sensors");
   }
-  for (BadChannel& b : checked.bad) out.second.push_back({log.file, std::move(b)});
+  for (BadChannel& b : checked.bad) {
+    const bool in_errors = stays(b, kInErrors);
+    out.second.push_back({log.file, std::move(b), in_errors});
+  }
 }
 
 }  // namespace

@@ -119,6 +119,7 @@ struct CompareOptions {
 struct BadChannelOfLog {
   std::string file;
   BadChannel bad;
+  bool in_errors = false;  ///< whether it stays in the errors that are stated, else it is set aside
 };
 
 /// A sensor connected or named wrongly, and the log it is in.
@@ -137,7 +138,7 @@ struct CompareResult {
   StageAtFault fault;                  ///< split errors, and the stage at fault by the ranking
   std::vector<RegimeError> regimes;    ///< errors by regime, with 95 % intervals
   std::vector<WorstSegment> segments;  ///< motions with the largest errors, in that order
-  /// Filled by `compare` and `fit`, which have the logs; what of it stays in the errors: Staying.
+  /// Filled by `compare` and `fit`, which have the logs.
   std::vector<BadChannelOfLog> bad_data;
   std::vector<SlipOfLog> slips;    ///< sensors connected or named wrongly, where regions are sought
   std::vector<std::string> notes;  ///< what was not compared, and why; whole sentences

@@ -204,6 +204,7 @@ void causes_json(const CompareResult& result, Json& root) {
                                 {"from_s", b.bad.from_s},
                                 {"to_s", b.bad.to_s},
                                 {"share", b.bad.share},
+                                {"in_errors", b.in_errors},
                                 {"evidence", b.bad.evidence},
                                 {"remedy", b.bad.remedy}});
   }
@@ -402,12 +403,10 @@ std::string compare_table(const CompareResult& result) {
       "at least a\nthird of its RMS); bias = predicted - measured\n";
   if (!result.slips.empty()) text += "\nsensors that seem to be connected or named wrongly\n";
   for (const SlipOfLog& s : result.slips) text += wrapped(s.file + ": " + s.slip.sentence);
-  if (!result.bad_data.empty())
-    text +=
-        "\nbad data, set aside here and in what is learned; jumps (an effect may explain them) and "
-        "ripples of a position count here\n";
+  if (!result.bad_data.empty()) text += "\nbad data; none of it takes part in what is learned\n";
   for (const BadChannelOfLog& b : result.bad_data)
-    text += wrapped(b.file + ": " + bad_channel_sentence(b.bad));
+    text += wrapped(fmt::format("{}: {}: {}", b.in_errors ? "in the errors" : "set aside", b.file,
+                                bad_channel_sentence(b.bad)));
   if (!result.fault.sentence.empty()) text += "\nstage at fault\n" + wrapped(result.fault.sentence);
   if (!result.worst.empty()) text += "\nregions with the largest errors\n";
   for (const WorstRegion& w : result.worst) text += wrapped(w.stage + ": " + w.sentence);

@@ -30,7 +30,8 @@ Log without_bad_data(Log log, const std::vector<BadChannel>& bad) {
 }
 
 bool stays(const BadChannel& bad, Staying staying) {
-  return (bad.kind == BadDataKind::kJumping && staying != Staying::kNothing) ||
+  return staying == Staying::kAll ||
+         (bad.kind == BadDataKind::kJumping && staying != Staying::kNothing) ||
          (bad.kind == BadDataKind::kRippling && staying == Staying::kJumpsAndRipples);
 }
 
@@ -38,6 +39,7 @@ CheckedSignals checked_signals(const Machine& machine, const Log& log, const Sig
                                const BadDataOptions& bad_data, Staying staying) {
   CheckedSignals out;
   out.signals = make_signals(machine, log, signals);
+  if (staying == Staying::kAll) return out;
   out.bad = find_bad_channels(machine, log, out.signals, bad_data);
   std::vector<BadChannel> aside = out.bad;
   std::erase_if(aside, [&](const BadChannel& b) { return stays(b, staying); });

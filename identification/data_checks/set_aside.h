@@ -13,6 +13,7 @@ Log without_bad_data(Log log, const std::vector<BadChannel>& bad);
 
 /// Faults that stay in the signals.
 enum class Staying {
+  kAll,      ///< where the caller does not want data checks: nothing is looked for
   kNothing,  ///< where laws are learned
   kJumps,  ///< of a single channel, where effects are sought: a late pump jumps as well as a sensor
   kJumpsAndRipples  ///< where errors are stated: a ripple of millimetres falsifies speeds, and hardly a static force

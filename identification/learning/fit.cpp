@@ -87,13 +87,13 @@ struct LogSignals {
 
 void add_log(const Machine& machine, const Log& log, const FitOptions& options, Staying staying,
              LogSignals& out) {
-  if (!options.check_data) {
-    out.signals.push_back(make_signals(machine, log, options.signals));
-    return;
-  }
-  CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data, staying);
+  CheckedSignals one = checked_signals(machine, log, options.signals, options.bad_data,
+                                       options.check_data ? staying : Staying::kAll);
   out.signals.push_back(std::move(one.signals));
-  for (BadChannel& b : one.bad) out.bad.push_back({log.file, std::move(b)});
+  for (BadChannel& b : one.bad) {
+    const bool in_errors = stays(b, staying);
+    out.bad.push_back({log.file, std::move(b), in_errors});
+  }
 }
 
 LogSignals all_signals(const Machine& machine, const std::vector<Log>& logs,

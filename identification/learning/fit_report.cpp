@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "identification/comparison/report_numbers.h"
-#include "identification/data_checks/set_aside.h"
 #include "identification/learning/fit.h"
 #include "models/math/units.h"
 
@@ -122,9 +121,8 @@ std::string FitResult::full() const {
     text += fmt::format("set aside: {}: {}\n", b.file, bad_channel_sentence(b.bad));
   if (test)
     for (const BadChannelOfLog& b : test->bad_data)
-      text += fmt::format("{}: {}: {}\n",
-                          stays(b.bad, Staying::kJumpsAndRipples) ? "bad data" : "set aside",
-                          b.file, bad_channel_sentence(b.bad));
+      text += fmt::format("{}: {}: {}\n", b.in_errors ? "bad data" : "set aside", b.file,
+                          bad_channel_sentence(b.bad));
   for (const std::string& note : notes) text += "note: " + note + "\n";
   return text + brief() + "\n";
 }

@@ -167,12 +167,14 @@ void add_bad_data(Page& page, const CompareResult& result) {
   if (result.bad_data.empty()) return;
   Table table;
   table.title = "Bad data";
-  table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}};
+  table.columns = {{"log"}, {"what was found"}, {"of the log", "%", 2}, {"in the errors"}};
   for (const BadChannelOfLog& b : result.bad_data)
-    table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share});
+    table.rows.push_back({b.file, bad_channel_sentence(b.bad), 100.0 * b.bad.share,
+                          b.in_errors ? "yes" : "set aside"});
   table.note =
-      "No model explains these channels. They take no part in the errors and in what is learned; "
-      "jumps take part in the errors, because an effect may explain them, and so do ripples of a "
+      "No model explains these channels, and nothing is learned from them. Where a model is "
+      "judged, "
+      "jumps are in the errors, because an effect may explain them, and so are ripples of a "
       "position, which hardly change a static force.";
   page.table(std::move(table));
 }

@@ -178,6 +178,7 @@ TEST(CompareJson, HasTheCauses) {
   ASSERT_EQ(json["bad_data"].size(), 1u);
   EXPECT_EQ(json["bad_data"][0]["channel"], "p_main");
   EXPECT_EQ(json["bad_data"][0]["kind"], "stuck");
+  EXPECT_EQ(json["bad_data"][0]["in_errors"], false);
   const std::string table = compare_table(r);
   EXPECT_THAT(table, HasSubstr("stage at fault"));
   EXPECT_THAT(table, HasSubstr("p_main is stuck"));

@@ -50,12 +50,20 @@ TEST(FaultyLog, IsComparedWithoutItsFault) {
   EXPECT_EQ(r.find("pump", "main")->n, healthy.find("pump", "main")->n);
   EXPECT_EQ(r.find("flow", "arm")->n, healthy.find("flow", "arm")->n);
   EXPECT_LT(r.find("force", "arm")->n, healthy.find("force", "arm")->n);
+  EXPECT_FALSE(r.bad_data[0].in_errors);
+  EXPECT_THAT(compare_table(r), HasSubstr("set aside: " + arm_log().file + ": pA_arm is stuck"));
 }
 
-TEST(FaultyLog, JumpsStayWhereAModelIsJudgedOnly) {
+/// The arm's log with a chamber pressure that jumps three times.
+Log jumping_log() {
   Log log = arm_log(kSensorNoise, 1);
   for (const Eigen::Index at : {600, 1300, 2200})
     channel(log, "pA_arm").values.segment(at, 40).array() += 40.0 * units::kBar;
+  return log;
+}
+
+TEST(FaultyLog, JumpsStayWhereAModelIsJudgedOnly) {
+  const Log log = jumping_log();
   const BadDataOptions options;
   const CheckedSignals stay = checked_signals(arm_machine(), log, {}, options, Staying::kJumps),
                        aside = checked_signals(arm_machine(), log, {}, options, Staying::kNothing);
@@ -69,6 +77,28 @@ TEST(FaultyLog, JumpsStayWhereAModelIsJudgedOnly) {
   EXPECT_LE(known(aside), known(stay) - 60);  // of the 120 samples that jump
   EXPECT_GT(compare(arm_model(), {log}).find("force", "arm")->rmse,
             2.0 * compare(arm_model(), {arm_log(kSensorNoise, 1)}).find("force", "arm")->rmse);
+}
+
+TEST(FaultyLog, SaysWhetherAFaultIsInTheErrors) {
+  const Log log = jumping_log();
+  const CompareResult judged = compare(arm_model(), {log});
+  ASSERT_EQ(judged.bad_data.size(), 1U);
+  EXPECT_TRUE(judged.bad_data[0].in_errors);
+  EXPECT_THAT(compare_table(judged), HasSubstr("in the errors: " + log.file + ": pA_arm jumps"));
+  const FitResult fitted = fit(arm_machine(), {log}, {log});
+  ASSERT_EQ(fitted.train.bad_data.size(), 1U);
+  EXPECT_FALSE(fitted.train.bad_data[0].in_errors) << "nothing is learned from jumps";
+  ASSERT_TRUE(fitted.test.has_value());
+  ASSERT_EQ(fitted.test->bad_data.size(), 1U);
+  EXPECT_TRUE(fitted.test->bad_data[0].in_errors);
+}
+
+TEST(FaultyLog, WithoutChecksAllStays) {
+  const CheckedSignals all = checked_signals(arm_machine(), stuck_log(), {}, {}, Staying::kAll);
+  EXPECT_TRUE(all.bad.empty());
+  const MachineSignals raw = make_signals(arm_machine(), stuck_log());
+  EXPECT_TRUE(all.signals.cylinders[0].force.isApprox(raw.cylinders[0].force));
+  EXPECT_TRUE(stays({}, Staying::kAll));
 }
 
 }  // namespace
