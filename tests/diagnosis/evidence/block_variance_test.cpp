@@ -42,7 +42,7 @@ TEST(BlockVariance, IsEstimatedBesideTheAutoregression) {
   VectorXd y = draw(truth, blocks, random);
   std::vector<double> scale;
   for (const NoiseBlock& b : blocks) {
-    scale.push_back(std::exp(0.8 * normal(random)));
+    scale.push_back(std::exp(1.3 * normal(random)));
     y.segment(b.first, b.last - b.first) *= scale.back();
   }
   const NoiseModel m = NoiseModel::estimate(y, blocks, false, by_block());
