@@ -205,8 +205,6 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
   };
   DiagnoseOptions now = options;
   now.evidence.settles = true;
-  if (now.evidence.mechanisms.act(Mechanism::kBlocks))
-    now.evidence.noise.block_freedom = now.verdict.block_freedom;
   // What a model lacks is more than what changes. Physics left out here would be noise beside every difference.
   DiagnoseOptions alone = now;
   alone.search.max_effects =

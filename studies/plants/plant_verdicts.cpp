@@ -1,7 +1,6 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling]
-//                  [--without-block-variances] [-v]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling] [-v]
 //     [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
@@ -41,8 +40,7 @@ struct Arguments {
   std::uint64_t seed = 1;
   double seconds = 200.0;
   std::string only, json, logs;
-  bool no_reference = false, without_settling = false, without_support = false,
-       without_block_variances = false, verbose = false;
+  bool no_reference = false, without_settling = false, without_support = false, verbose = false;
 };
 
 /// Change of a channel over its sensor's noise from which a change counts as one above a sensor's noise. Many rows show smaller ones.
@@ -225,7 +223,6 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       c.at = clean ? "" : hidden.at;
       const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
       DiagnoseOptions options;
-      if (a.without_block_variances) options.evidence.mechanisms.switch_off(Mechanism::kBlocks);
       if (a.without_settling) options.evidence.mechanisms.switch_off(Mechanism::kSettling);
       if (a.without_support) options.evidence.mechanisms.switch_off(Mechanism::kCommonSupport);
       const Diagnosis d =
@@ -357,8 +354,6 @@ int run_with(int argc, char** argv) {
   app.add("--json", a.json, "file for the counts");
   app.add("--logs", a.logs, "folder for the logs and the learned models");
   app.flag("--no-reference", a.no_reference, "diagnose without the reference log");
-  app.flag("--without-block-variances", a.without_block_variances,
-           "one variance of the noise for all stretches of motion");
   app.flag("--without-settling", a.without_settling, "noise that does not settle after commands");
   app.flag("--without-common-support", a.without_support,
            "pressures outside the references' flows and forces are compared, too");
