@@ -7,6 +7,7 @@
 #include "apps/cli/verbs.h"
 #include "apps/report/motion_pages/benchmark_page.h"
 #include "apps/tasks/benchmark/benchmark_task.h"
+#include "models/math/error.h"
 #include "simulator/controllers/registry.h"
 
 namespace sparflow::cli {
