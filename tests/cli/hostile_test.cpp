@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 
 #include <chrono>
+#include <csignal>
 #include <thread>
 
 #include "tests/cli/cli_fixture.h"
@@ -29,6 +30,14 @@ class HostileCli : public Cli {
   /// so that under it the program runs without one.
   static std::string within_memory(int kib, const std::string& line) {
     return kSanitized ? line : "ulimit -v " + std::to_string(kib) + "; " + line;
+  }
+  /// Shell that waits until process $p catches `signal` (a busy machine may take a second to start it), then for `seconds`,
+  /// sends it the signal, and ends with the exit code of the process.
+  static std::string send(int signal, double seconds) {
+    const unsigned bit = 1U << unsigned(signal - 1);
+    return "until [ $((0x$(sed -n 's/^SigCgt:[[:space:]]*//p' /proc/$p/status) & " +
+           std::to_string(bit) + ")) -ne 0 ]; do kill -0 $p || exit 1; sleep 0.02; done; sleep " +
+           std::to_string(seconds) + "; kill -" + std::to_string(signal) + " $p; wait $p";
   }
   std::string fit(const std::string& rest) const {
     return "$S fit -m " + kCrane + " -l " + at("short.csv") + " " + rest;
@@ -187,8 +196,8 @@ TEST_F(HostileCli, MessagesAreClippedAndShowNoEscape) {
 }
 
 TEST_F(HostileCli, SigtermEndsLikeCtrlC) {
-  const Outcome o = shell("$S simulate -m " + kCrane +
-                          " --seconds 100000 -o l.csv & sleep 0.3; kill -TERM $!; wait $!");
+  const Outcome o = shell("$S simulate -m " + kCrane + " --seconds 100000 -o l.csv & p=$!; " +
+                          send(SIGTERM, 0.3));
   EXPECT_EQ(o.code, 130);
 }
 
@@ -198,8 +207,7 @@ class InterruptedCli : public HostileCli {
   InterruptedCli() { write("p.yaml", reach("loader_crane_lift")); }
   /// Ends `arguments` by Ctrl-C after a while.
   Outcome interrupted_after(double seconds, const std::string& arguments) const {
-    return shell("$S " + arguments + " & p=$!; sleep " + std::to_string(seconds) +
-                 "; kill -INT $p; wait $p");
+    return shell("$S " + arguments + " & p=$!; " + send(SIGINT, seconds));
   }
   json document(const std::string& name) const { return json::parse(slurp(folder_ / name)); }
 };
@@ -248,9 +256,10 @@ TEST_F(InterruptedCli, TheBoundEndsWithinASecond) {
 
 TEST_F(InterruptedCli, AChildThatWasKilledIsNoSuccess) {
   write("q.yaml", reach("loader_crane_lift"));
-  const Outcome o =
-      shell("$S strategies -p p.yaml q.yaml --processes 2 --model " + model() +
-            " --json s.json & p=$!; sleep 0.4; kill -KILL $(pgrep -P $p | head -1); wait $p");
+  const Outcome o = shell(
+      "$S strategies -p p.yaml q.yaml --processes 2 --model " + model() +
+      " --json s.json & p=$!; until pgrep -P $p > children; do kill -0 $p || exit 1; sleep 0.02;"
+      " done; kill -KILL $(head -1 children); wait $p");
   EXPECT_EQ(o.code, 4);
   EXPECT_THAT(o.err, HasSubstr("ended by signal 9"));
 }
