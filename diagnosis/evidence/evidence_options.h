@@ -80,6 +80,13 @@ struct NoiseOptions {
   /// Blocks below which they have no random offset.
   /// @threshold [blocks] 2..; chosen: a variance of fewer block means says nothing
   int fewest_blocks_for_offsets = 4;
+  /// Rows that the prior of a block's variance is worth; zero: all blocks have one variance. Beside references alone
+  /// (VerdictOptions::block_freedom).
+  /// @threshold [rows] 0..; chosen: one variance for all blocks
+  double block_freedom = 0.0;
+  /// Blocks below which they have one variance.
+  /// @threshold [blocks] 2..; chosen: as fewest_blocks_for_offsets
+  int fewest_blocks_for_scales = 4;
   /// Rows of a block that count as one independent row of its mean, while the mean is shrunken.
   /// @threshold [rows] 1..; chosen: stands for the autoregression, which is not known yet in that
   /// step

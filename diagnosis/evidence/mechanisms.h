@@ -31,9 +31,10 @@ enum class Mechanism : unsigned {
   kOnce,             ///< isolated event: a large gain without significance
   kEvent,            ///< event in the residual of a force or speed
   kSettling,         ///< noise that is larger while the machine settles after a change of a command
-  kCommonSupport,    ///< pressures are compared where the references have flows and forces
-  kVoid,             ///< speeds are compared where the chamber that grows carries pressure
-  kPumpFollows,      ///< changes of the demand show in the pump's pressure by the lag that it has
+  kBlocks,         ///< a second search beside references, with variances of the stretches of motion
+  kCommonSupport,  ///< pressures are compared where the references have flows and forces
+  kVoid,           ///< speeds are compared where the chamber that grows carries pressure
+  kPumpFollows,    ///< changes of the demand show in the pump's pressure by the lag that it has
   kCount
 };
 

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "models/math/robust.h"
+
 namespace sparflow {
 namespace {
 
@@ -165,6 +167,48 @@ NoiseModel estimate_evenly(const Eigen::Ref<const Eigen::VectorXd>& residual,
   return m;
 }
 
+/// The most likely deviations of the blocks, whose variances have a prior of the inverse gamma distribution about that of the model,
+/// which makes a block's values Student's (Lange, Little, Taylor 1989, J. Am. Stat. Assoc. 84, 881), in turn with the model.
+/// @param m of `values`  @param estimate of values of one deviation
+template <typename Estimate>
+NoiseModel with_block_scales(NoiseModel m, const Eigen::VectorXd& values,
+                             const std::vector<NoiseBlock>& blocks, const NoiseOptions& options,
+                             const Estimate& estimate) {
+  constexpr int kScaleTurns = 2;
+  const double freedom = options.block_freedom;
+  if (!(freedom > 0.0) ||
+      blocks.size() < static_cast<std::size_t>(options.fewest_blocks_for_scales))
+    return m;
+  const auto rows = [&](std::size_t b) {
+    return static_cast<double>(blocks[b].last - blocks[b].first);
+  };
+  std::vector<double> scale(blocks.size(), 1.0), squares(blocks.size());
+  for (int turn = 0; turn < kScaleTurns; ++turn) {
+    Eigen::MatrixXd white = values;
+    m.whiten(blocks, white);
+    std::vector<double> means;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      const auto [first, last] = blocks[b];
+      squares[b] = scale[b] * scale[b] * white.col(0).segment(first, last - first).squaredNorm();
+      if (rows(b) > 0.0) means.push_back(squares[b] / rows(b));
+    }
+    // the variance of all values together is that of the loudest blocks
+    const double variance =
+        turn == 0 ? median(Eigen::Map<const Eigen::VectorXd>(means.data(), std::ssize(means)))
+                  : m.variance;
+    Eigen::VectorXd even = values;
+    for (std::size_t b = 0; b < blocks.size(); ++b) {
+      scale[b] =
+          std::sqrt((freedom + squares[b] / std::max(variance, 1e-300)) / (freedom + rows(b)));
+      even.segment(blocks[b].first, blocks[b].last - blocks[b].first) /= scale[b];
+    }
+    m = estimate(even);
+    m.block_scale = scale;
+    m.block_freedom = freedom;
+  }
+  return m;
+}
+
 /// Sum of the logarithms of values between 1 and NoiseOptions::largest_transient_ratio, few of which are taken.
 double sum_of_logs(const Eigen::VectorXd& values) {
   constexpr Eigen::Index kAtOnce = 64;  // 30^64 < 1e95
@@ -225,6 +269,23 @@ Eigen::VectorXd NoiseModel::scale_of(const NoiseRows& rows) const {
   return 1.0 + (transient - 1.0) * rows.since_change->decay(settling).array();
 }
 
+double NoiseModel::log_prior() const {
+  double sum = 0.0;
+  for (const double k : block_scale)
+    sum -= 0.5 * block_freedom * (2.0 * std::log(k) + 1.0 / (k * k) - 1.0);
+  return sum;
+}
+
+NoiseModel NoiseModel::white_of(const Eigen::Ref<const Eigen::VectorXd>& values,
+                                const NoiseRows& rows, const NoiseOptions& options) {
+  const auto white = [](const Eigen::Ref<const Eigen::VectorXd>& of) {
+    NoiseModel m;
+    m.variance = std::max(of.squaredNorm() / static_cast<double>(of.size()), 1e-300);
+    return m;
+  };
+  return with_block_scales(white(values), values, rows.blocks, options, white);
+}
+
 NoiseModel NoiseModel::settling_of(const Eigen::Ref<const Eigen::VectorXd>& values,
                                    const NoiseRows& rows, const NoiseOptions& options) {
   NoiseModel m;
@@ -236,8 +297,12 @@ NoiseModel NoiseModel::estimate(const Eigen::Ref<const Eigen::VectorXd>& residua
                                 const NoiseRows& rows, bool offsets, const NoiseOptions& options) {
   const NoiseModel settling = settling_of(residual, rows, options);
   const Eigen::VectorXd scale = settling.scale_of(rows);
-  if (scale.size() == 0) return estimate_evenly(residual, rows.blocks, offsets, options);
-  NoiseModel m = estimate_evenly(residual.cwiseQuotient(scale), rows.blocks, offsets, options);
+  const Eigen::VectorXd even =
+      scale.size() > 0 ? residual.cwiseQuotient(scale).eval() : Eigen::VectorXd(residual);
+  const auto evenly = [&](const Eigen::Ref<const Eigen::VectorXd>& of) {
+    return estimate_evenly(of, rows.blocks, offsets, options);
+  };
+  NoiseModel m = with_block_scales(evenly(even), even, rows.blocks, options, evenly);
   m.transient = settling.transient;
   m.settling = settling.settling;
   return m;
@@ -265,6 +330,10 @@ NoiseModel NoiseModel::scaled_to(const Eigen::Ref<const Eigen::VectorXd>& residu
 double NoiseModel::whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> columns) const {
   const Eigen::VectorXd scale = scale_of(rows);
   if (scale.size() > 0) columns.array().colwise() *= scale.array().inverse().eval();
+  const bool by_block = !block_scale.empty() && block_scale.size() == rows.blocks.size();
+  for (std::size_t b = 0; by_block && b < block_scale.size(); ++b)
+    columns.middleRows(rows.blocks[b].first, rows.blocks[b].last - rows.blocks[b].first) /=
+        block_scale[b];
   const Reflection reflection = reflections(*this);
   const double k1 = reflection.k1, k2 = reflection.k2;
   // standard deviations of the first two samples in units of the innovation's
@@ -273,6 +342,10 @@ double NoiseModel::whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> col
   const double ratio = offset_variance / variance;
   double log_determinant = 0.0;
   if (scale.size() > 0) log_determinant -= sum_of_logs(scale);
+  if (by_block) log_determinant += log_prior();
+  for (std::size_t b = 0; by_block && b < block_scale.size(); ++b)
+    log_determinant -=
+        static_cast<double>(rows.blocks[b].last - rows.blocks[b].first) * std::log(block_scale[b]);
   Eigen::VectorXd one, before;
   for (const auto& [first, last] : rows.blocks) {
     const Eigen::Index n = last - first;

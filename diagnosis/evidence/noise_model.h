@@ -61,7 +61,8 @@ struct NoiseRows {
 
 /// The autoregression and the offsets are those of y / s(t), s(t) = 1 + (transient - 1) exp(-t / settling), with t the time since the
 /// machine began to settle: pumps, spools, columns of oil and a bouncing boom settle, and what a model lacks of that must not count as
-/// noise of steady motion.
+/// noise of steady motion. They are also relative to the blocks' deviations, where these differ (NoiseOptions::block_freedom): a law
+/// that is not exact leaves more in some motions than in others.
 struct NoiseModel {
   double phi1 = 0.0, phi2 = 0.0;  ///< y_t = phi1 y_{t-1} + phi2 y_{t-2} + e_t; stationary
   double variance = 1.0;          ///< [unit^2 of the series] variance of e_t
@@ -69,6 +70,9 @@ struct NoiseModel {
   double transient =
       1.0;  ///< [-] deviation right after a change of a command over that in steady motion, >= 1
   double settling = 1.0;  ///< [s] time constant with which it settles
+  /// [blocks] deviation of each block over that of the model; empty: one in all of them
+  std::vector<double> block_scale;
+  double block_freedom = 0.0;  ///< [rows] that the prior of a block's variance is worth
 
   /// Moment estimates from residuals: autocovariances are pooled over blocks about the blocks' shrunken means; the
   /// offset variance is the variance of block means beyond what the autoregression explains.
@@ -91,8 +95,15 @@ struct NoiseModel {
 
   /// Makes rows independent with variance `variance`, by the exact inverse square root of the covariance of each block.
   /// @param columns [rows x any], in place
-  /// @return log-determinant of the transformation, to be added to a log-likelihood
+  /// @return log-determinant of the transformation and log_prior(), to be added to a log-likelihood
   double whiten(const NoiseRows& rows, Eigen::Ref<Eigen::MatrixXd> columns) const;
+
+  /// Logarithm of the prior density of the blocks' deviations over that of equal ones. [nats]
+  double log_prior() const;
+
+  /// White noise of the variance of `values`, beside the blocks' own deviations.
+  static NoiseModel white_of(const Eigen::Ref<const Eigen::VectorXd>& values, const NoiseRows& rows,
+                             const NoiseOptions& options);
 
   /// s(t) of every row; empty where it is one. [rows]
   Eigen::VectorXd scale_of(const NoiseRows& rows) const;

@@ -131,9 +131,8 @@ NoiseModel ordinary_noise_of(const Evidence& evidence, std::size_t channel,
                              const VectorXd& values) {
   if (!evidence.options.settles)
     return settling_noise_of(evidence.channels[channel], values, evidence.options.noise);
-  NoiseModel noise;
-  noise.variance = std::max(values.squaredNorm() / static_cast<double>(values.size()), 1e-300);
-  return noise;
+  return NoiseModel::white_of(values, evidence.channels[channel].noise_rows(),
+                              evidence.options.noise);
 }
 
 /// Alternates between the effects' parameters, for given noise models, and the noise models of the fit's residuals.

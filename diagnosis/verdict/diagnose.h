@@ -141,6 +141,12 @@ struct VerdictOptions {
   /// Absorbed share of an effect from which its size in single motions is not compared, but its parameters in all of them.
   /// @threshold [1] 0..1; chosen: more of it is learned than left
   double absorbed_by_learned_laws = 0.5;
+  /// NoiseOptions::block_freedom in the second search of a comparison with references, where the first, with one variance for all
+  /// blocks, names nothing: what a law lacks is rarely alike in all motions, and a few of large residuals would hide a change that all
+  /// others show.
+  /// @threshold [rows] 0..; chosen: a tenth of the rows of a stretch of motion, whose variance is then that of its own residual but for
+  /// a tenth
+  double block_freedom = 10.0;
   /// Searches in which an effect that the references share joins what acts in all logs.
   /// @threshold [1] 1..; chosen: each removes what the last one named in both; plants of the simulator need up to six
   int shared_turns = 10;

@@ -53,6 +53,7 @@ const Named kMechanisms[] = {{"leaders", Mechanism::kLeaders},
                              {"once", Mechanism::kOnce},
                              {"event", Mechanism::kEvent},
                              {"settling", Mechanism::kSettling},
+                             {"blocks", Mechanism::kBlocks},
                              {"common_support", Mechanism::kCommonSupport},
                              {"void", Mechanism::kVoid},
                              {"pump_follows", Mechanism::kPumpFollows}};

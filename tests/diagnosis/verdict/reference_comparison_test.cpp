@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "diagnosis/selection/search_candidates.h"
@@ -373,6 +374,33 @@ TEST(ReferenceComparison, AChangeBesideItIsNamedAlone) {
   EXPECT_THAT(keys_of(d.effects), ElementsAre("viscous_friction:jib")) << d.table();
   EXPECT_FALSE(d.effects.front().change);
   EXPECT_THAT(keys_of(d.lacking), Contains("coulomb_friction:boom"));
+}
+
+/// A force that no law explains in two motions of either log would hide a friction that all others show.
+TEST(ReferenceComparison, MotionsThatNoLawExplainsHideNoChangeThatAllOthersShow) {
+  const auto disturbed = [](Log log, double from) {
+    Eigen::VectorXd& pressure = testing_support::channel(log, "pA_boom").values;
+    for (Eigen::Index k = 0; k < log.samples(); ++k) {
+      const double t = log.time[k] - from;
+      if (t > 0.0 && t < 12.0) pressure[k] += 60e5 * std::sin(2.0 * std::numbers::pi * 0.21 * t);
+    }
+    return log;
+  };
+  const Log reference = disturbed(crane_log({}, 7), 40.0);
+  const CraneModel model = [] {
+    FitOptions options;
+    options.hold_out_every = 0;
+    return fit(loader(), {crane_log({}, 7)}, {}, options).model;
+  }();
+  const Log log = disturbed(crane_log({{"viscous_friction", "boom", 0.4, 0}}, 8), 20.0);
+  DiagnoseOptions options;
+  options.check_data = false;
+  const Diagnosis d = diagnose(model, {log}, {reference}, options);
+  EXPECT_EQ(d.verdict, Verdict::kMissing);
+  EXPECT_THAT(keys_of(d.effects), ElementsAre("viscous_friction:boom"));
+  options.evidence.mechanisms.switch_off(Mechanism::kBlocks);
+  const Diagnosis w = diagnose(model, {log}, {reference}, options);
+  EXPECT_THAT(keys_of(w.effects), IsEmpty());
 }
 
 TEST(ReferenceComparison, AnotherValueOfItIsAChangeAndItsParametersAreTheDifference) {
