@@ -154,18 +154,29 @@ bool ChannelBuilder::finish(std::vector<EvidenceChannel>& out) {
   return true;
 }
 
-void set_force_slope(EvidenceChannel& channel, std::size_t suspects,
-                     const EvidenceOptions& options) {
-  channel.force_slope = VectorXd::Zero(channel.rows());
+void set_slopes(EvidenceChannel& channel, std::size_t suspects, const EvidenceOptions& options) {
+  channel.flow_slope = VectorXd::Zero(channel.rows());
+  if (channel.baseline.cols() == 3) {
+    const VectorXd b = least_squares(channel.baseline, channel.y);
+    channel.flow_slope = (b[1] + 2.0 * b[2] * channel.baseline.col(1).array()) / kBaselineFlow;
+  }
+  const bool returning =
+      channel.kind == EvidenceKind::kReturnExtend || channel.kind == EvidenceKind::kReturnRetract;
+  if (!returning) channel.force_slope = VectorXd::Zero(channel.rows());
   if (channel.baseline.cols() != 5) return;
   const CavitationFloor floor = add_cavitation_floor(channel, suspects, options);
-  const auto flow = channel.baseline.col(1).array();
+  const auto flow = channel.baseline.col(1).array(), force = channel.baseline.col(3).array();
+  const auto by_flow = [&](const VectorXd& law) {
+    return (law[1] + 2.0 * law[2] * flow + law[4] * force).eval();
+  };
   const VectorXd b = least_squares(channel.baseline, channel.y);
   channel.force_slope = (b[3] + b[4] * flow) / kBaselineForce;
+  channel.flow_slope = by_flow(b) / kBaselineFlow;
   if (floor.law.size() == 0) return;
   const auto held = (channel.baseline.col(5).array() > 0.0).cast<double>();
   channel.force_slope.array() -=
       b[5] * 1e-5 * held * (floor.law[3] + floor.law[4] * flow) / kBaselineForce;
+  channel.flow_slope.array() -= b[5] * 1e-5 * held * by_flow(floor.law) / kBaselineFlow;
 }
 
 }  // namespace sparflow

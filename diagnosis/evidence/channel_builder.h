@@ -39,9 +39,9 @@ class ChannelBuilder {
   std::vector<Eigen::VectorXd> rows_;  // baseline
 };
 
-/// Sets the derivative of a supply channel's baseline by the measured force; its columns are 1, Q, Q^2, F, Q F in the
-/// scales above. Where an anti-cavitation valve limits the pressure from below, a column for that limit is added first.
-void set_force_slope(EvidenceChannel& channel, std::size_t suspects,
-                     const EvidenceOptions& options);
+/// Sets the derivatives of a chamber's baseline by the flow and, in a supply channel, by the measured force; its columns are 1, Q, Q^2
+/// and, there, F, Q F in the scales above. Where an anti-cavitation valve limits a supply pressure from below, a column for that limit is
+/// added first.
+void set_slopes(EvidenceChannel& channel, std::size_t suspects, const EvidenceOptions& options);
 
 }  // namespace sparflow

@@ -90,8 +90,14 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     Eigen::MatrixXd raw;
     const Eigen::MatrixXd inertial =
         inertial_columns(*effect.effect, series[log], {channel.kind, channel.index}, effect.at);
+    bool through_flow = false;  // over the return edge
     if (!effect.effect->columns(series[log], {channel.kind, channel.index, about}, effect.at, shape,
                                 raw)) {
+      through_flow = channel.flow_slope.size() > 0 && channel.index == effect.at &&
+                     effect.effect->return_edge_flow(series[log], effect.at, shape, raw);
+      if (!through_flow) raw.resize(0, 0);
+    }
+    if (raw.size() == 0) {
       if (inertial.size() == 0) continue;
       raw.setZero(inertial.rows(), inertial.cols());  // a mass that turns about a vertical axis
     }
@@ -122,6 +128,7 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
       for (Index r = channel.blocks[b].first; r < channel.blocks[b].last; ++r) {
         for (Index c = 0; c < raw.cols(); ++c) {
           double v = raw(channel.sample[static_cast<std::size_t>(r)], c);
+          if (through_flow) v *= channel.flow_slope[r];
           if (through_force.size() > 0) {
             v -= channel.force_slope[r] *
                  through_force(channel.sample[static_cast<std::size_t>(r)], c);

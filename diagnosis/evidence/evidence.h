@@ -39,6 +39,9 @@ struct EvidenceChannel {
   /// Supply channels: change of the baseline with the measured force [rows, Pa/N]. An error of a pressure sensor also
   /// changes the measured force and thereby the baseline.
   Eigen::VectorXd force_slope;
+  /// Channels of a chamber: change of the baseline with the flow over the return edge, which sets the pressure of either chamber [rows,
+  /// Pa s/m^3]. Oil that passes it and moves no rod (a leak past the piston) is no part of the baseline's flow.
+  Eigen::VectorXd flow_slope;
   double largest_force = 0.0;  ///< [N] largest static force; force channels only
   /// What the effects add that act in suspect and reference logs alike (EvidenceOptions::shared).
   struct SharedAction {

@@ -431,8 +431,12 @@ void EvidenceCollector::add_pressure_channel(int cylinder, const ChamberRole& ch
                 gain_pressure_[log]);
   }
   b.channel.noise_floor = noise.value();
-  if (b.finish(e.channels) && !chamber.returning)
-    set_force_slope(e.channels.back(), e.suspects, e.options);
+  if (!b.finish(e.channels)) return;
+  set_slopes(e.channels.back(), e.suspects, e.options);
+  if (!chamber.returning) {
+    const Cylinder& c = model_.machine.cylinders[static_cast<std::size_t>(cylinder)];
+    e.channels.back().flow_slope *= supply_area(c, chamber.side) / supply_area(c, -chamber.side);
+  }
 }
 
 void EvidenceCollector::add_pump_channel(int pump) {

@@ -34,6 +34,7 @@ EvidenceChannel without_rows(const EvidenceChannel& all, const std::vector<Mask>
   out.since_change = all.since_change.of_rows(kept);
   out.baseline = all.baseline(kept, Eigen::all).eval();
   if (all.force_slope.size() > 0) out.force_slope = all.force_slope(kept).eval();
+  if (all.flow_slope.size() > 0) out.flow_slope = all.flow_slope(kept).eval();
   for (EvidenceChannel::SharedAction& s : out.shared) s.values = s.values(kept).eval();
   return out;
 }

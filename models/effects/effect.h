@@ -196,6 +196,14 @@ class Effect {
   /// @return false when the effect does not act on this quantity or the log lacks a channel it needs
   virtual bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                        std::span<const double> shape, Eigen::MatrixXd& columns) const;
+  /// What one unit of each linear parameter adds to the flow over the return edge of cylinder `at` while it moves, beside the flow of
+  /// the rod; the learned laws of the chambers' pressures then give other pressures. [samples x linear parameters, m^3/s]
+  /// @return false when the effect changes no such flow or the log lacks a channel it needs
+  virtual bool return_edge_flow(const MachineSeries& /*log*/, int /*at*/,
+                                std::span<const double> /*shape*/,
+                                Eigen::MatrixXd& /*columns*/) const {
+    return false;
+  }
   /// Values of the nonlinear parameter `shape_index` (counted among the nonlinear ones) to search on this log [SI]. The
   /// default is the parameter's own grid; limits and thresholds depend on the range of the log. Empty: the log lacks
   /// what the effect needs.

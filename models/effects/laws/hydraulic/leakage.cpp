@@ -28,13 +28,14 @@ class Leakage final : public Effect {
                         "-",
                         1.0,
                         0.0,
-                        2.0,
+                        3.0,
                         0.0,
                         "0: past the closed spool, at rest only; 1: past the piston, at rest as "
                         "well; 2: past "
-                        "the piston with tight ports, in motion only",
+                        "the piston with tight ports, in motion only; 3: the same, and the "
+                        "pressures follow the flow over the return edge by the learned laws",
                         false,
-                        {0.0, 1.0, 2.0},
+                        {0.0, 1.0, 2.0, 3.0},
                         true}},
         .equation =
             "dx/dt = Q_valve/A - F k/A_hold^2; tight ports: dx/dt = Q_valve/A - k (p_A - "
@@ -52,7 +53,10 @@ class Leakage final : public Effect {
   std::vector<int> places(const Machine& machine) const override {
     return hydraulic_cylinders(machine);
   }
-  std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
+  std::vector<EvidenceKind> shows_in() const override {
+    using enum EvidenceKind;
+    return {kFlow, kReturnExtend, kReturnRetract, kSupplyExtend, kSupplyRetract};
+  }
   /// In motion, a flow that falls with the pressure across the piston is also that of a valve whose compensator yields.
   bool needs_reference(std::span<const double> shape) const override { return is_tight(shape); }
 
@@ -65,7 +69,7 @@ class Leakage final : public Effect {
     const Eigen::VectorXd& force = carried_force(log_cylinder);
     const Eigen::VectorXi& direction = log_cylinder.direction;
     const bool chambers = log_cylinder.pressure_a.size() > 0 && log_cylinder.pressure_b.size() > 0;
-    const bool tight = is_tight(shape), at_rest_only = shape[0] < 0.5;  // no threshold: 0, 1 or 2
+    const bool tight = is_tight(shape), at_rest_only = shape[0] < 0.5;  // no threshold: 0 to 3
     columns.setZero(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
       const double load_area = supply_area(c, force[k] > 0.0 ? 1 : -1);  // holds the load
@@ -82,9 +86,20 @@ class Leakage final : public Effect {
     return true;
   }
 
+  /// What passes the piston from A to B leaves B beside the rod's flow while the rod extends, and does not leave A while it retracts.
+  bool return_edge_flow(const MachineSeries& log, int at, std::span<const double> shape,
+                        Eigen::MatrixXd& columns) const override {
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
+    if (shape[0] < 2.5 || c.pressure_a.size() == 0 ||
+        c.pressure_b.size() == 0)  // no threshold: 0 to 3
+      return false;
+    columns = c.direction.cast<double>().cwiseProduct(c.pressure_a - c.pressure_b);
+    return true;
+  }
+
  private:
   static bool is_tight(std::span<const double> shape) {
-    return shape[0] > 1.5;  // no threshold: 0, 1 or 2
+    return shape[0] > 1.5;  // no threshold: 0 to 3
   }
 };
 

@@ -380,6 +380,17 @@ TEST_F(FlowEffects, LeakageLowersTheLoad) {
   EXPECT_NEAR(piston(0, 0), -50e5 / a, 1e-6 * 50e5 / a);
   EXPECT_EQ(piston(1500, 0), 0.0);
   EXPECT_NEAR(piston(1999, 0), -50e5 / b, 1e-6 * 50e5 / b);
+  // What passes it from A to B leaves B beside the rod's flow, or does not leave A; whether pressures follow is a variant.
+  const Effect& leakage = effect_named("leakage");
+  MatrixXd edge;
+  EXPECT_FALSE(leakage.return_edge_flow(log, 0, std::vector{2.0}, edge));
+  ASSERT_TRUE(leakage.return_edge_flow(log, 0, std::vector{3.0}, edge));
+  EXPECT_EQ(edge(0, 0), 50e5);
+  EXPECT_EQ(edge(1500, 0), 0.0);
+  EXPECT_EQ(edge(1999, 0), -50e5);
+  EXPECT_EQ(columns("leakage", 0, 0, {3.0}), piston);
+  c.pressure_b.resize(0);
+  EXPECT_FALSE(leakage.return_edge_flow(log, 0, std::vector{3.0}, edge));
 }
 
 // A chamber of 1.0 m + 5 % of 2 m at 1 GPa: 10 bar/s take 1.1 mm/s.
