@@ -90,9 +90,8 @@ class Leakage final : public Effect {
   bool return_edge_flow(const MachineSeries& log, int at, std::span<const double> shape,
                         Eigen::MatrixXd& columns) const override {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    if (shape[0] < 2.5 || c.pressure_a.size() == 0 ||
-        c.pressure_b.size() == 0)  // no threshold: 0 to 3
-      return false;
+    const bool followed = shape[0] > 2.5;  // no threshold: 0 to 3
+    if (!followed || c.pressure_a.size() == 0 || c.pressure_b.size() == 0) return false;
     columns = c.direction.cast<double>().cwiseProduct(c.pressure_a - c.pressure_b);
     return true;
   }
