@@ -3,6 +3,7 @@
 /// a verdict with its evidence. docs/diagnose.md describes the method; effect_search.h has the search, residual_model.h
 /// the search for unmodelled structure in the residual.
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,14 @@ struct ParameterEstimate {
 struct ChannelGain {
   std::size_t channel = 0;                                        ///< index into Evidence::channels
   double rmse_before = 0.0, rmse_after = 0.0, noise_floor = 0.0;  ///< SI; floor NaN = not known
+  /// The same errors with the squares of each stretch of motion weighed by the inverse of its variance, where the
+  /// search gave the stretches variances of their own; else NaN. [SI]
+  double weighed_before = std::numeric_limits<double>::quiet_NaN(), weighed_after = weighed_before;
+
+  /// The errors by which the search judged the effect: weighed where stretches have variances of their own. [SI]
+  bool weighed() const { return weighed_before == weighed_before; }
+  double before() const { return weighed() ? weighed_before : rmse_before; }
+  double after() const { return weighed() ? weighed_after : rmse_after; }
 };
 
 struct DiagnosedEffect {
@@ -181,6 +190,8 @@ struct Diagnosis {
   std::vector<std::pair<std::string, double>>
       ranking;  ///< first step: key, penalised gain [nats], best first
   std::vector<std::string> notes;
+  /// Whether the search gave each stretch of motion a variance of its own (VerdictOptions::block_freedom).
+  bool stretches_weighed = false;
   double seconds = 0.0;
 
   Evidence evidence;    ///< for the charts of pages
@@ -196,6 +207,11 @@ struct Diagnosis {
   std::string headline() const;                          ///< one sentence
   /// The p-value in words: "0.02", or "below 0.0033" where the number of simulations allows no smaller one.
   std::string p_value_text() const;
+  /// Weight of the rows of each block of a channel as the final fit weighs them: the inverse of the block's own variance, relative
+  /// to the channel's. [blocks] Empty where all blocks have one variance.
+  std::vector<double> block_weights(std::size_t channel) const;
+  /// What a search with variances of the stretches of motion means for the reader; "" for a search without.
+  std::string weighing_text() const;
   /// Why nothing is named, in a sentence: there is only noise, or what is more than noise is no difference, or no effect passes the
   /// tests. For the verdict none.
   std::string none_text() const;

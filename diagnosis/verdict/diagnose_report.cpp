@@ -56,6 +56,9 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
                              {"rmse_before", g.rmse_before / c.unit.si},
                              {"rmse_after", g.rmse_after / c.unit.si},
                              {"noise_floor", json_number(g.noise_floor / c.unit.si)}});
+    if (!g.weighed()) continue;
+    j["channels"].back()["rmse_weighed_before"] = g.weighed_before / c.unit.si;
+    j["channels"].back()["rmse_weighed_after"] = g.weighed_after / c.unit.si;
   }
   if (!e.channels.empty()) {
     const ChannelGain& g = e.channels.front();
@@ -197,6 +200,12 @@ std::string Diagnosis::p_value_text() const {
   return fmt::format("{}{:.2g}", at_resolution ? "below " : "", p_value);
 }
 
+std::string Diagnosis::weighing_text() const {
+  if (!stretches_weighed) return "";
+  return "with one variance of the noise for all stretches of motion nothing is named: a few "
+         "motions that the laws do not explain hide it, which have less weight here";
+}
+
 std::string Diagnosis::none_text() const {
   if (p_value >= SearchOptions().false_alarm)
     return fmt::format(
@@ -276,6 +285,7 @@ std::string Diagnosis::json() const {
   for (const auto& [key, gain] : ranking) j["ranking"].push_back({{"effect", key}, {"gain", gain}});
   j["gate"] = {{"threshold", search.threshold}};
   j["notes"] = notes;
+  j["stretches_weighed"] = stretches_weighed;
   j["seconds"] = seconds;
   return j.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }

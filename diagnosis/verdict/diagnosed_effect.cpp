@@ -8,22 +8,47 @@
 #include "diagnosis/selection/leader_updates.h"
 #include "diagnosis/verdict/residual_levels.h"
 #include "identification/comparison/report_numbers.h"
+#include "models/math/nan.h"
 
 namespace sparflow {
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
-double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd& residual) {
+namespace {
+
+/// @param weights of the blocks' rows; empty: one
+double weighed_rms(const Evidence& evidence, std::size_t channel, const VectorXd& residual,
+                   const std::vector<double>& weights) {
   const EvidenceChannel& c = evidence.channels[channel];
-  double squares = 0.0, n = 0.0;
+  double squares = 0.0, rows = 0.0;
   for (std::size_t b = 0; b < c.blocks.size(); ++b) {
     if (static_cast<std::size_t>(c.log[b]) >= evidence.suspects) continue;
     const Index length = c.blocks[b].last - c.blocks[b].first;
-    squares += residual.segment(c.blocks[b].first, length).squaredNorm();
-    n += static_cast<double>(length);
+    const double weight = weights.empty() ? 1.0 : weights[b];
+    squares += weight * residual.segment(c.blocks[b].first, length).squaredNorm();
+    rows += weight * static_cast<double>(length);
   }
-  return n > 0.0 ? std::sqrt(squares / n) : 0.0;
+  return rows > 0.0 ? std::sqrt(squares / rows) : 0.0;
+}
+
+}  // namespace
+
+double suspect_rms(const Evidence& evidence, std::size_t channel, const VectorXd& residual) {
+  return weighed_rms(evidence, channel, residual, {});
+}
+
+std::vector<double> Diagnosis::block_weights(std::size_t channel) const {
+  if (channel >= search.final.noise.size()) return {};
+  std::vector<double> weights = search.final.noise[channel].block_scale;
+  if (weights.size() != evidence.channels[channel].blocks.size()) return {};
+  for (double& w : weights) w = 1.0 / (w * w);
+  return weights;
+}
+
+double weighed_suspect_rms(const Diagnosis& d, std::size_t channel, const VectorXd& residual) {
+  const std::vector<double> weights = d.block_weights(channel);
+  return weights.empty() ? kNaN : weighed_rms(d.evidence, channel, residual, weights);
 }
 
 EffectFit fit_without(const Diagnosis& d, std::size_t index) {
@@ -91,29 +116,35 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
     if (!f.design.touches(c)) continue;
     e.channels.push_back({c, suspect_rms(d.evidence, c, without.residual[c]),
                           suspect_rms(d.evidence, c, d.search.final.residual[c]),
-                          d.evidence.channels[c].noise_floor});
+                          d.evidence.channels[c].noise_floor,
+                          weighed_suspect_rms(d, c, without.residual[c]),
+                          weighed_suspect_rms(d, c, d.search.final.residual[c])});
   }
   std::sort(e.channels.begin(), e.channels.end(), [](const ChannelGain& a, const ChannelGain& b) {
-    return a.rmse_before / a.rmse_after > b.rmse_before / b.rmse_after;
+    return a.before() / a.after() > b.before() / b.after();
   });
+  const auto rms = [&d](const ChannelGain& g, const VectorXd& residual) {
+    return g.weighed() ? weighed_suspect_rms(d, g.channel, residual)
+                       : suspect_rms(d.evidence, g.channel, residual);
+  };
   for (const ChannelGain& g : e.channels) {
     const EvidenceChannel& c = d.evidence.channels[g.channel];
-    if (g.rmse_before < d.thresholds.least_reduction * g.rmse_after) continue;
+    if (g.before() < d.thresholds.least_reduction * g.after()) continue;
     const VectorXd before = settled(d, g.channel, without.residual[g.channel]);
     const VectorXd after = settled(d, g.channel, d.search.final.residual[g.channel]);
     const bool settles = d.search.final.noise[g.channel].transient != 1.0;
     e.evidence.push_back(fmt::format(
-        "{}: error {} -> {} {}{}{}", c.text, plain_number(g.rmse_before / c.unit.si, 3),
-        plain_number(g.rmse_after / c.unit.si, 3), c.unit.name,
+        "{}: error{} {} -> {} {}{}{}", c.text,
+        g.weighed() ? ", weighed by the variance of each stretch of motion," : "",
+        plain_number(g.before() / c.unit.si, 3), plain_number(g.after() / c.unit.si, 3),
+        c.unit.name,
         std::isfinite(g.noise_floor)
             ? fmt::format(" (sensor noise {})", plain_number(g.noise_floor / c.unit.si, 2))
             : "",
-        settles
-            ? fmt::format("; without starts and stops {} -> {} {}",
-                          plain_number(suspect_rms(d.evidence, g.channel, before) / c.unit.si, 3),
-                          plain_number(suspect_rms(d.evidence, g.channel, after) / c.unit.si, 3),
-                          c.unit.name)
-            : ""));
+        settles ? fmt::format("; without starts and stops {} -> {} {}",
+                              plain_number(rms(g, before) / c.unit.si, 3),
+                              plain_number(rms(g, after) / c.unit.si, 3), c.unit.name)
+                : ""));
   }
   e.evidence.push_back(
       fmt::format("it improves the prediction of motions left out of the estimate, in {:.0f} % of "

@@ -7,6 +7,10 @@ namespace sparflow {
 /// RMS of a residual over the rows of suspect logs. [SI]
 double suspect_rms(const Evidence& evidence, std::size_t channel, const Eigen::VectorXd& residual);
 
+/// The same, weighed by Diagnosis::block_weights. [SI] NaN where all blocks have one variance.
+double weighed_suspect_rms(const Diagnosis& d, std::size_t channel,
+                           const Eigen::VectorXd& residual);
+
 /// Fit of all found effects except one, with the load-sensing leaders that follow from the others.
 /// @param index of the found effect to leave out; the number of found effects leaves out none
 EffectFit fit_without(const Diagnosis& d, std::size_t index);

@@ -311,9 +311,8 @@ Diagnosis diagnose_against_references(const CraneModel& model, const DiagnosisSi
     Diagnosis weighed = differences.search(progress);
     if (weighed.verdict == Verdict::kMissing) {
       d = std::move(weighed);
-      d.notes.push_back(
-          "with one variance of the noise for all stretches of motion nothing is named: a few "
-          "motions that the laws do not explain hide it, which have less weight here");
+      d.stretches_weighed = true;
+      d.notes.push_back(d.weighing_text());
     }
   }
   // Other motions alone can make a residual larger, so that it takes a difference found in the channel to say whose it is.

@@ -121,6 +121,24 @@ TEST(DiagnosePage, ShowsTheProbabilityOfTheTerminalAndNoCertaintyThatIsNone) {
   EXPECT_EQ(d.effects[0].shown_probability(), 29.0);
 }
 
+/// Beside the headline stands the error by which the search judged the effect, and why it is another one than the RMS.
+TEST(DiagnosePage, ShowsTheErrorAsTheSearchWeighsIt) {
+  const CraneModel model = arm_model();
+  Diagnosis d = missing_friction(model);
+  ASSERT_FALSE(d.effects[0].channels.empty());
+  const std::string plain = diagnose_page(model, d).html();
+  EXPECT_THAT(plain, ::testing::Not(HasSubstr("weighed")));
+  d.stretches_weighed = true;
+  ChannelGain& gain = d.effects[0].channels[0];
+  gain.weighed_before = 641.0;
+  gain.weighed_after = 123.0;
+  const std::string html = diagnose_page(model, d).html();
+  EXPECT_THAT(html, HasSubstr("641 \u2192 123 N (weighed by the variance of each stretch"));
+  EXPECT_THAT(html,
+              HasSubstr("With one variance of the noise for all stretches of motion nothing"));
+  EXPECT_THAT(html, HasSubstr("weighed, without it"));
+}
+
 TEST(DiagnosePage, ChannelPictureRemovesTheEffect) {
   const CraneModel model = arm_model();
   const Diagnosis d = missing_friction(model);

@@ -95,6 +95,17 @@ Quantity axis_of(const EvidenceChannel& channel, const std::string& unit) {
           unit};
 }
 
+/// Weight of each row of a channel in the error by which an effect was judged. [rows]
+VectorXd row_weights(const Diagnosis& d, const EvidenceChannel& channel) {
+  const std::vector<double> weights =
+      d.block_weights(static_cast<std::size_t>(&channel - d.evidence.channels.data()));
+  VectorXd rows = VectorXd::Ones(channel.rows());
+  for (std::size_t b = 0; b < weights.size(); ++b)
+    rows.segment(channel.blocks[b].first, channel.blocks[b].last - channel.blocks[b].first)
+        .setConstant(weights[b]);
+  return rows;
+}
+
 /// Draws measurement and model over the stretch of one log in which the effect shows most, with gaps between blocks.
 LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string& effect) {
   const EvidenceChannel& channel = *p.channel;
@@ -102,6 +113,7 @@ LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string&
   std::vector<Index> rows;
   std::size_t best_log = 0;
   double most = -1.0;
+  const VectorXd weight = row_weights(d, channel);
   for (std::size_t log = 0; log < d.evidence.suspects; ++log) {
     std::vector<Index> own;
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
@@ -114,7 +126,7 @@ LineChart curves(const Diagnosis& d, const ChannelPicture& p, const std::string&
     for (Index i = 0; i < n; ++i) {
       const Index r = own[static_cast<std::size_t>(i)];
       time[i] = d.evidence.series[log].time[channel.sample[static_cast<std::size_t>(r)]];
-      gain[i] = p.without[r] * p.without[r] - p.with[r] * p.with[r];
+      gain[i] = weight[r] * (p.without[r] * p.without[r] - p.with[r] * p.with[r]);
     }
     const Stretch at = best_stretch(time, gain, kStretchSeconds);
     const double sum = gain.segment(at.first, at.last - at.first).sum();

@@ -52,11 +52,12 @@ std::string channel_words(const Diagnosis& d, const ChannelGain& g) {
 /// "force of boom 4.1 -> 0.62 kN, sensor noise 0.55"
 std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
   const FieldUnit& unit = d.evidence.channels[g.channel].unit;
-  const auto [before, name] = readable_error(g.rmse_before, unit);
-  const double scale = before / g.rmse_before;
+  const auto [before, name] = readable_error(g.before(), unit);
+  const double scale = before / g.before();
   std::string text =
       fmt::format("{} {} \u2192 {} {}", channel_words(d, g), display_number(before, 3),
-                  display_number(g.rmse_after * scale, 3), name);
+                  display_number(g.after() * scale, 3), name);
+  if (g.weighed()) text += " (weighed by the variance of each stretch of motion)";
   if (std::isfinite(g.noise_floor))
     text += fmt::format(", sensor noise {}", display_number(g.noise_floor * scale, 2));
   return text;
@@ -86,6 +87,7 @@ void set_verdict(Page& page, const Machine& machine, const Diagnosis& d,
   if (d.verdict == Verdict::kNone) {
     text += d.none_text() + " ";
   } else if (d.verdict == Verdict::kMissing) {
+    if (d.stretches_weighed) text += sentence(d.weighing_text()) + " ";
     text += fmt::format("Chance of such evidence if no effect were missing: {}.", d.p_value_text());
   }
   Tone tone = tone_of(d.verdict);
@@ -124,16 +126,30 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
   errors.columns = {
       {"effect"}, {"quantity"}, {"without it", "", 3}, {"with it", "", 3}, {"sensor noise", "", 3},
       {"unit"}};
+  if (d.stretches_weighed)
+    errors.columns.insert(errors.columns.begin() + 2,
+                          {{"weighed, without it", "", 3}, {"weighed, with it", "", 3}});
   for (const DiagnosedEffect& e : d.effects) {
     for (const ChannelGain& g : e.channels) {
       const FieldUnit& unit = d.evidence.channels[g.channel].unit;
       const auto [before, name] = readable_error(g.rmse_before, unit);
       const double scale = g.rmse_before > 0.0 ? before / g.rmse_before : 1.0 / unit.si;
-      errors.rows.push_back({e.key(), channel_words(d, g), before, g.rmse_after * scale,
-                             std::isfinite(g.noise_floor) ? g.noise_floor * scale : kNaN, name});
+      std::vector<TableCell> row = {e.key(),
+                                    channel_words(d, g),
+                                    before,
+                                    g.rmse_after * scale,
+                                    std::isfinite(g.noise_floor) ? g.noise_floor * scale : kNaN,
+                                    name};
+      if (d.stretches_weighed)
+        row.insert(row.begin() + 2, {g.weighed_before * scale, g.weighed_after * scale});
+      errors.rows.push_back(std::move(row));
     }
   }
   errors.note = "RMS. All other effects found are in the model in both columns.";
+  if (d.stretches_weighed)
+    errors.note +=
+        " Weighed: with the squares of each stretch of motion over its own variance, as the search "
+        "weighed them.";
   if (!errors.rows.empty()) page.table(std::move(errors));
 }
 
