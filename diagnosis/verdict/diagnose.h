@@ -104,7 +104,7 @@ struct VerdictOptions {
   /// (docs/history/diagnosis.md).
   double far_above_noise = 5.0;
   /// Share of the squared error beyond noise that all effects must explain where an effect's place
-  /// keeps a large error, else the effect is a minor one.
+  /// keeps a large error, else the effect is a minor one, in logs without references. Beside references `least_excess_explained` counts.
   /// @threshold [1] 0..1; chosen: four fifths; what stays has less than half the amplitude of what
   /// was there. On the tuning logs no true effect comes as far as this test
   /// (docs/history/diagnosis.md).

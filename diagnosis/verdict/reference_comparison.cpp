@@ -39,7 +39,7 @@ double explained_excess(const Diagnosis& d, const Diagnosis& without, std::size_
   const auto square = [&](const Diagnosis& of) {
     return std::pow(suspect_rms(of.evidence, channel, of.search.final.residual[channel]), 2);
   };
-  const double excess = square(without) - std::pow(reference_rms(d, channel), 2);
+  const double excess = square(without) - std::pow(expected_rms(d, channel), 2);
   return excess > 0.0 ? (square(without) - square(d)) / excess : 1.0;
 }
 

@@ -37,7 +37,7 @@ std::vector<ReferenceFault> reference_faults(const CraneModel& model,
     const EvidenceChannel& channel = d.evidence.channels[c];
     const double there = suspect_rms(d.evidence, c, d.search.final.residual[c]);
     const double here = reference_rms(d, c);
-    if (!(there > d.thresholds.least_excess_ratio * here)) continue;
+    if (!(there > d.thresholds.least_excess_ratio * expected_rms(d, c))) continue;
     const std::optional<double> chance = chance_beyond_references(d, c);
     if (!chance || *chance >= d.thresholds.structure_false_alarm) continue;
     faults.push_back({channel.text, channel.unit, there, here});

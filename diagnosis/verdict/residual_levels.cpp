@@ -4,11 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "diagnosis/residual/residual_oscillation.h"
 #include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/block_levels.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/nan.h"
 #include "models/math/student.h"
@@ -19,42 +19,18 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// Mean, variance of the mean and largest of the logarithms of the blocks' mean squares, in which rows count by their deviation.
-struct BlockLevel {
-  double mean = 0.0, variance_of_mean = 0.0, largest = 0.0;
-  int blocks = 0;
-};
-
-BlockLevel block_level(const Diagnosis& d, std::size_t channel, bool references) {
-  const EvidenceChannel& c = d.evidence.channels[channel];
-  const VectorXd residual = settled(d, channel, d.search.final.residual[channel]);
-  BlockLevel level;
-  std::vector<double> levels;
-  for (std::size_t b = 0; b < c.blocks.size(); ++b) {
-    if ((static_cast<std::size_t>(c.log[b]) >= d.evidence.suspects) != references) continue;
-    const Index length = c.blocks[b].last - c.blocks[b].first;
-    const double square = residual.segment(c.blocks[b].first, length).squaredNorm();
-    levels.push_back(std::log(
-        std::max(square / static_cast<double>(length), std::numeric_limits<double>::min())));
-  }
-  level.blocks = static_cast<int>(levels.size());
-  if (levels.size() < 2) return level;
-  const auto n = static_cast<double>(levels.size());
-  const Eigen::Map<const VectorXd> v(levels.data(), static_cast<Index>(levels.size()));
-  level.mean = v.mean();
-  level.largest = v.maxCoeff();
-  level.variance_of_mean = (v.array() - level.mean).square().sum() / (n - 1.0) / n;
-  return level;
+LevelComparison levels_of(const Diagnosis& d, std::size_t channel) {
+  return compare_levels(d.evidence, channel, settled(d, channel, d.search.final.residual[channel]));
 }
 
-/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike (Welch and
-/// Satterthwaite).
-double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
-  const double variance = suspect.variance_of_mean + reference.variance_of_mean;
-  const double freedom = variance * variance /
-                         (std::pow(suspect.variance_of_mean, 2) / (suspect.blocks - 1.0) +
-                          std::pow(reference.variance_of_mean, 2) / (reference.blocks - 1.0));
-  return student_tail((suspect.mean - reference.mean) / std::sqrt(variance), freedom);
+/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike: Student's, and no
+/// less than one over the number of ways to choose the suspect blocks among all, which is the least that exchangeable levels
+/// allow whatever their distribution (Pitman 1937, J. R. Stat. Soc. Suppl. 4, 119). Three blocks that happen to be alike prove little.
+double chance_of_level(const LevelComparison& levels) {
+  const double n = levels.suspects, m = levels.references;
+  const double ways = std::lgamma(n + m + 1.0) - std::lgamma(n + 1.0) - std::lgamma(m + 1.0);
+  return std::max(student_tail(levels.difference / std::sqrt(levels.variance), levels.freedom),
+                  std::exp(-ways));
 }
 
 /// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:
@@ -63,13 +39,11 @@ double chance_of_level(const BlockLevel& suspect, const BlockLevel& reference) {
 /// in 115 channels of logs without a change Student's has said "below 0.001" of five. And where the references have nearly as large a one,
 /// it is no difference.
 /// @param excess ratio of the RMS
-double chance_of_largest(const BlockLevel& suspect, const BlockLevel& reference, double excess) {
-  if (suspect.largest < reference.largest + 2.0 * std::log(excess)) return 1.0;
-  const double n = reference.blocks;
-  const double deviation = std::sqrt(reference.variance_of_mean * n * (1.0 + 1.0 / n));
-  const double z = (suspect.largest - reference.mean) / deviation;
+double chance_of_largest(const LevelComparison& levels, double excess) {
+  if (levels.largest < levels.largest_in_references + 2.0 * std::log(excess)) return 1.0;
+  const double z = levels.largest / levels.largest_deviation;
   const double laplace = 0.5 * std::exp(-std::numbers::sqrt2 * z);
-  return suspect.blocks * std::max(student_tail(z, n - 1.0), laplace);
+  return levels.suspects * std::max(student_tail(z, levels.references - 1.0), laplace);
 }
 
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and
@@ -102,22 +76,22 @@ double among_channels(const Diagnosis& d, double chance) {
 
 std::optional<Excess> excess_over_references(const Diagnosis& d, std::size_t channel) {
   if (!d.evidence.has_reference()) return std::nullopt;
-  const BlockLevel suspect = block_level(d, channel, false),
-                   reference = block_level(d, channel, true);
-  if (std::min(suspect.blocks, reference.blocks) < 2) return std::nullopt;
+  const LevelComparison levels = levels_of(d, channel);
+  if (std::min(levels.suspects, levels.references) < 2) return std::nullopt;
   const double ratio = d.thresholds.least_excess_ratio;
-  const Excess excess{chance_of_level(suspect, reference),
-                      chance_of_largest(suspect, reference, ratio)};
+  const Excess excess{chance_of_level(levels), chance_of_largest(levels, ratio)};
   if (tracing())
-    fmt::print(stderr,
-               "  {}: residual {:.3g}, in the references {:.3g} {}, by chance {:.2g}, in one "
-               "block {:.2g}, {} and {} blocks\n",
-               d.evidence.channels[channel].text,
-               suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
-                   d.evidence.channels[channel].unit.si,
-               reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
-               d.evidence.channels[channel].unit.name, excess.level, excess.largest, suspect.blocks,
-               reference.blocks);
+    fmt::print(
+        stderr,
+        "  {}: residual {:.3g}, in the references {:.3g} ({:.3g} at equal work) {}, by chance "
+        "{:.2g}, in one block {:.2g}, {} and {} blocks\n",
+        d.evidence.channels[channel].text,
+        suspect_rms(d.evidence, channel, d.search.final.residual[channel]) /
+            d.evidence.channels[channel].unit.si,
+        reference_rms(d, channel) / d.evidence.channels[channel].unit.si,
+        expected_rms(d, channel) / d.evidence.channels[channel].unit.si,
+        d.evidence.channels[channel].unit.name, excess.level, excess.largest, levels.suspects,
+        levels.references);
   return excess;
 }
 
@@ -158,6 +132,14 @@ double reference_rms(const Diagnosis& d, std::size_t channel) {
   return reference_rms(d, channel, d.search.final.residual[channel]);
 }
 
+double expected_rms(const Diagnosis& d, std::size_t channel, const VectorXd& residual) {
+  return reference_rms(d, channel, residual) * std::exp(0.5 * levels_of(d, channel).explained);
+}
+
+double expected_rms(const Diagnosis& d, std::size_t channel) {
+  return expected_rms(d, channel, d.search.final.residual[channel]);
+}
+
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel) {
   const std::optional<Excess> excess = excess_over_references(d, channel);
   if (!excess) return std::nullopt;
@@ -174,7 +156,7 @@ std::optional<std::size_t> channel_beyond_references(const Diagnosis& d) {
   double least = d.thresholds.structure_false_alarm;
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     if (!(suspect_rms(d.evidence, c, d.search.final.residual[c]) >
-          d.thresholds.least_excess_ratio * reference_rms(d, c)))
+          d.thresholds.least_excess_ratio * expected_rms(d, c)))
       continue;
     const std::optional<double> chance = chance_beyond_references(d, c);
     if (chance && *chance < least) {
@@ -194,10 +176,13 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
   const std::vector<ResidualStructure> there =
       find_residual_structure(swapped, d.search.final, options.residual);
   for (std::size_t i = 0; i < left.size(); ++i) {
-    const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
-      return r.channel == left[i].channel && d.thresholds.least_excess_ratio * r.rms >= left[i].rms;
-    });
     const std::size_t channel = left[i].channel;
+    // what would be alike at equal work
+    const double ratio =
+        d.thresholds.least_excess_ratio * std::exp(0.5 * levels_of(d, channel).explained);
+    const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
+      return r.channel == channel && ratio * r.rms >= left[i].rms;
+    });
     const double floor = d.evidence.channels[channel].noise_floor;
     const auto beyond_noise = [&](double rms) {
       return std::max(0.0, rms * rms - (std::isfinite(floor) ? floor * floor : 0.0));
@@ -206,19 +191,17 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
     const double here =
         std::min(left[i].rms * left[i].rms,
                  beyond_noise(suspect_rms(d.evidence, channel, d.search.final.residual[channel])));
-    const bool room =
-        beyond_noise(reference_rms(d, channel)) * std::pow(d.thresholds.least_excess_ratio, 2) >=
-        here;
+    const bool room = beyond_noise(reference_rms(d, channel)) * ratio * ratio >= here;
     // one that is weaker than what counts as an oscillation is one all the same
     const bool oscillates =
         left[i].oscillation &&
-        d.thresholds.least_excess_ratio *
-                strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
+        ratio * strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
             left[i].rms;
     const double tests = static_cast<double>(left.size());
     if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.opposite_false_alarm)
       out[i] = BesideReferences::kOpposite;
-    else if ((found || room || oscillates) && !exceeds_references(d, channel))
+    else if ((found || room || oscillates) &&
+             (left[i].oscillation || !exceeds_references(d, channel)))
       out[i] = BesideReferences::kShared;
   }
   return out;

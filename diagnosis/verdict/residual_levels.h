@@ -31,8 +31,13 @@ Eigen::VectorXd settled(const Diagnosis& d, std::size_t channel, const Eigen::Ve
 double reference_rms(const Diagnosis& d, std::size_t channel, const Eigen::VectorXd& residual);
 double reference_rms(const Diagnosis& d, std::size_t channel);
 
+/// The same at the loads and speeds of the suspect logs, by the slopes of the levels of single motions over load and speed
+/// (block_levels.h).
+double expected_rms(const Diagnosis& d, std::size_t channel, const Eigen::VectorXd& residual);
+double expected_rms(const Diagnosis& d, std::size_t channel);
+
 /// Probability, by Bonferroni's bound over the channels, that a channel's final residual is so much larger in the suspect logs
-/// than in the references by chance, on the logarithms of the blocks' mean squares: Welch's (1947) test of their means, and
+/// than in the references by chance, on the logarithms of the blocks' mean squares at equal work (block_levels.h): Welch's (1947) test of their means, and
 /// Student's prediction for the largest one, because a deviation in one stretch of motion hardly moves the mean. Nothing
 /// where there are no references, or too few motions of one kind.
 std::optional<double> chance_beyond_references(const Diagnosis& d, std::size_t channel);
@@ -49,8 +54,9 @@ enum class BesideReferences {
   kShared  ///< theirs, so that it is no change
 };
 /// For each structure: shared is one of which the references have as large a one in the same channel by the same residual models, or
-/// leave about as much beyond the sensors' noise there, and the residual of the suspect logs is neither larger
-/// (exceeds_references) nor opposite.
+/// leave about as much beyond the sensors' noise there, and the residual of the suspect logs is neither significantly larger
+/// (exceeds_references) nor opposite. No signal of the logs explains an oscillation, whose strength other motions alone change:
+/// that it is less than twice as strong suffices.
 std::vector<BesideReferences> beside_references(const Diagnosis& d,
                                                 const std::vector<ResidualStructure>& left,
                                                 const DiagnoseOptions& options);

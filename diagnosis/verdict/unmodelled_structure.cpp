@@ -69,7 +69,7 @@ double unmodelled_share(const Diagnosis& d, const ResidualStructure& left,
   const double beyond_noise =
       std::max(0.0, after * after - (std::isfinite(floor) ? floor * floor : 0.0));
   double flexible = std::min(left.rms * left.rms, beyond_noise);
-  const double there = reference_rms(d, left.channel, final);
+  const double there = expected_rms(d, left.channel, final);
   if (beside != BesideReferences::kOpposite && there > floor)
     flexible = std::max(0.0, flexible - (there * there - floor * floor));
   return flexible / std::max(catalogue + flexible, 1e-300);
@@ -94,7 +94,7 @@ double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
   const ChannelGain& g = e.channels.front();
   // what stays unexplained in the references as well is no sign against an effect
   const VectorXd final = weighed(d, g.channel, d.search.final.residual[g.channel]);
-  const double shared = reference_rms(d, g.channel, final);
+  const double shared = expected_rms(d, g.channel, final);
   const bool by_references = shared > g.noise_floor;
   const double floor = by_references ? shared : g.noise_floor;
   // the references' residual contains the model's errors already
@@ -108,8 +108,10 @@ double explained_share(const Diagnosis& d, const DiagnosedEffect& e) {
 }
 
 bool is_minor_effect(const Diagnosis& d, const DiagnosedEffect& e) {
-  return d.evidence.options.mechanisms.act(
-      Mechanism::kMinor, explained_share(d, e) < d.thresholds.least_explained_share);
+  // Beside references it is part of the difference that the effect must explain, as in the comparison of the sizes.
+  const double least = d.evidence.has_reference() ? d.thresholds.least_excess_explained
+                                                  : d.thresholds.least_explained_share;
+  return d.evidence.options.mechanisms.act(Mechanism::kMinor, explained_share(d, e) < least);
 }
 
 Unexplained describe_minor_effect(const Evidence& evidence, const DiagnosedEffect& e) {

@@ -4,6 +4,11 @@
 namespace sparflow {
 namespace {
 
+/// Load-holding valves are set to 70 bar and more, and pilot ratios reach 10 (Chapple 2003, ch. 4), so that they open at 7 bar without
+/// load. Where the pressure falls with the load and there is no such part, another cause changes it.
+/// @threshold [Pa] 0..7e5; derived: half of that, for areas and seals
+constexpr double kLeastSetting = 3.5 * units::kBar;
+
 /// The effect is one valve on one side; where a cylinder has two, its pressure model has learned the other one already.
 /// With pilot ratio R and setting p_set, opening needs p_load + R p_supply + (A_supply/A_hold) p_supply = p_set:
 ///   p_supply = (p_set - p_load) / (R + A_supply/A_hold),
@@ -19,7 +24,7 @@ class Counterbalance final : public Effect {
         .parameters = {{"setting",
                         "bar",
                         units::kBar,
-                        0.0,
+                        kLeastSetting,
                         200 * units::kBar,
                         40 * units::kBar,
                         "supply pressure that opens the valve without load, above that of an "
