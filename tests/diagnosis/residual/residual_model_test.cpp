@@ -166,6 +166,14 @@ TEST(ResidualModel, AnOscillationThatTheReferencesHaveLessRegularlyIsNoChange) {
       d.search.final.residual[c].segment(channel.blocks[b].first,
                                          channel.blocks[b].last - channel.blocks[b].first) *= 1.05;
   EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kShared);
+  // significantly more, but less than twice: the motions alone change the strength of an oscillation
+  Diagnosis louder = d;
+  for (std::size_t b = 0; b < channel.blocks.size(); ++b)
+    if (channel.log[b] == 0)
+      louder.search.final.residual[c].segment(
+          channel.blocks[b].first, channel.blocks[b].last - channel.blocks[b].first) *= 1.8;
+  EXPECT_TRUE(exceeds_references(louder, c));
+  EXPECT_EQ(beside_references(louder, found, options)[0], BesideReferences::kShared);
   d.evidence.channels[c].raw[1] = quiet;
   EXPECT_EQ(beside_references(d, found, options)[0], BesideReferences::kMore);
 }

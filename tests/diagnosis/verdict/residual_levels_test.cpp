@@ -155,6 +155,33 @@ TEST(ResidualLevels, ALargestStretchHasTheHeavierOfTwoTails) {
   }
 }
 
+/// Beside references an effect must explain half of what exceeds them, without them four fifths of what exceeds the noise.
+TEST(ResidualLevels, AnEffectThatExplainsLittleIsMinor) {
+  Diagnosis d = with_laws(0.0, 0.0);
+  const std::size_t jib = jib_force(d);
+  const EvidenceChannel& channel = d.evidence.channels[jib];
+  const VectorXd noise = d.search.final.residual[jib];
+  DiagnosedEffect e;
+  e.channels = {{jib, 0.0, 0.0, 0.01 * kNoise}};
+  const auto minor =
+      [&](double
+              without) {  // residuals of the suspect log over those of the references, without and with it
+        for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
+          if (channel.log[b] != 0) continue;
+          const Eigen::Index first = channel.blocks[b].first, n = channel.blocks[b].last - first;
+          d.search.final.residual[jib].segment(first, n) = 4.0 * noise.segment(first, n);
+          d.search.null.residual[jib].segment(first, n) = without * noise.segment(first, n);
+        }
+        return is_minor_effect(d, e);
+      };
+  // of 16 - 1 squares that are left, without the effect 36 - 1 and 27 - 1
+  EXPECT_FALSE(minor(6.0));
+  EXPECT_TRUE(minor(5.2));
+  d.evidence.suspects = 2;  // no references
+  EXPECT_TRUE(minor(6.0));
+  EXPECT_FALSE(minor(20.0));
+}
+
 /// What the references leave as well is no sign against an effect in the suspect log, unless it has the opposite sign.
 TEST(ResidualLevels, OnlyWhatTheReferencesDoNotLeaveIsUnmodelled) {
   const auto share = [](double suspect, double reference, BesideReferences beside) {
