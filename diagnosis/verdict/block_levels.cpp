@@ -14,12 +14,11 @@ using Eigen::Vector2d;
 using Eigen::VectorXd;
 
 /// Standard deviation of the prior of the slopes, whose mean is zero.
-/// @threshold [1] 0..; derived: a residual in proportion to load or speed has the slope two in logarithms of squares
-constexpr double kSlope = 2.0;
+/// @threshold [1] 0..; derived: a residual in proportion to load or speed has the slope one in logarithms of squares
+constexpr double kSlope = 1.0;
 /// Least mean square of a load or speed in a block over that of all blocks.
 /// @threshold [1] 0..1; chosen: below a tenth of the RMS a level no longer follows the load: noise of the sensors is left
 constexpr double kLeastShare = 0.01;
-constexpr int kScaleTurns = 3;  // the variance of levels and the slopes depend on each other weakly
 
 double mean_square(const VectorXd& x, Index first, Index last) {
   double sum = 0.0, n = 0.0;
@@ -80,12 +79,16 @@ struct Group {
   std::vector<Index> blocks;
   double mean = 0.0, variance = 0.0;  // of the levels at equal work
   Vector2d work = Vector2d::Zero();   // mean
+  VectorXd levels;                    // [blocks] about their mean
+  Eigen::MatrixX2d works;             // [blocks x 2] the same
   auto n() const { return static_cast<double>(blocks.size()); }
 };
 
 void centre(Group& g, const VectorXd& level, const MatrixXd& work) {
   g.mean = level(g.blocks).mean();
   g.work = work(g.blocks, Eigen::all).colwise().mean();
+  g.levels = level(g.blocks).array() - g.mean;
+  g.works = work(g.blocks, Eigen::all).rowwise() - g.work.transpose();
 }
 
 }  // namespace
@@ -109,33 +112,23 @@ LevelComparison compare_levels(const Evidence& evidence, std::size_t channel,
   if (std::min(out.suspects, out.references) < 2) return out;
 
   const MatrixXd work = work_of_blocks(evidence, c);
-  Matrix2d squares = Matrix2d::Zero();
+  for (Group* g : {&suspect, &reference}) centre(*g, level, work);
+  // each group by the variance of its levels, so that those of a change that spread widely say little about the slopes
+  Matrix2d data = Matrix2d::Zero();
   Vector2d products = Vector2d::Zero();
-  for (Group* g : {&suspect, &reference}) {
-    centre(*g, level, work);
-    for (const Index b : g->blocks) {
-      const Vector2d x = work.row(b).transpose() - g->work;
-      squares += x * x.transpose();
-      products += x * (level[b] - g->mean);
-    }
+  for (const Group* g : {&suspect, &reference}) {
+    const double variance = g->levels.squaredNorm() / (g->n() - 1.0);
+    if (variance <= 0.0) continue;  // all levels are equal
+    data += g->works.transpose() * g->works / variance;
+    products += g->works.transpose() * g->levels / variance;
   }
-  Vector2d slope = Vector2d::Zero();
-  Matrix2d covariance = Matrix2d::Zero();
-  for (int turn = 0; turn < kScaleTurns; ++turn) {
-    double sum = 0.0;
-    for (Group* g : {&suspect, &reference}) {
-      double own = 0.0;
-      for (const Index b : g->blocks)
-        own += std::pow(level[b] - g->mean - slope.dot(work.row(b).transpose() - g->work), 2);
-      g->variance = own / (g->n() - 1.0);
-      sum += own;
-    }
-    const double variance = sum / (suspect.n() + reference.n() - 2.0);
-    if (variance <= 0.0) break;  // all levels are equal
-    const Matrix2d information = squares / variance + Matrix2d::Identity() / (kSlope * kSlope);
-    covariance = information.inverse();
-    slope = covariance * products / variance;
-  }
+  const Matrix2d covariance = (data + Matrix2d::Identity() / (kSlope * kSlope)).inverse();
+  const Vector2d slope = covariance * products;
+  // the slopes have taken so many degrees of freedom, less than two by their prior
+  const double free = suspect.n() + reference.n() - 2.0, taken = (covariance * data).trace();
+  for (Group* g : {&suspect, &reference})
+    g->variance =
+        (g->levels - g->works * slope).squaredNorm() / (g->n() - 1.0) * free / (free - taken);
 
   const Vector2d apart = suspect.work - reference.work;
   out.explained = slope.dot(apart);

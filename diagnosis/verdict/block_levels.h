@@ -9,7 +9,7 @@
 namespace sparflow {
 
 /// Levels are logarithms of the mean squares of blocks. The slopes by the logarithms of load and speed are common to both
-/// groups of logs, so that they say nothing about the difference itself.
+/// groups of logs, by generalised least squares with a variance for each group, so that they say nothing about the difference itself.
 struct LevelComparison {
   int suspects = 0, references = 0;  ///< blocks
   double difference = 0.0;           ///< of the mean levels at equal work

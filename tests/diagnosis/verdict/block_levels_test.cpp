@@ -104,19 +104,16 @@ TEST(BlockLevels, TheDifferenceIsThatOfLeastSquaresWithTheSlopesOfBothGroups) {
   for (Index k = 0; k < 2; ++k)
     design.col(2 + k).head(n) = (squares.col(k).array() + 0.01 * squares.col(k).mean()).log();
   VectorXd solution = VectorXd::Zero(4);
-  double variance = 0.0;
-  for (int turn = 0; turn < 4; ++turn) {
-    if (turn > 0)  // a slope of zero, within two
-      design(n, 2) = design(n + 1, 3) = std::sqrt(variance) / 2.0;
-    solution = turn == 0 ? VectorXd(VectorXd::Zero(4))
-                         : VectorXd(design.colPivHouseholderQr().solve(level));
-    VectorXd left = (level - design * solution).head(n);
-    for (int group : {0, 1}) {
-      const VectorXd own = design.col(group).head(n);
-      left -= own * (own.dot(left) / own.sum());
-    }
-    variance = left.squaredNorm() / static_cast<double>(n - 2);
+  design(n, 2) = design(n + 1, 3) = 1.0;  // a slope of zero, within one
+  VectorXd weight = VectorXd::Zero(n + 2);
+  weight.tail(2).setOnes();
+  for (const int group : {0, 1}) {  // rows over the deviation of their group
+    const VectorXd own = design.col(group).head(n);
+    const VectorXd left =
+        own.cwiseProduct(level.head(n) - VectorXd::Constant(n, own.dot(level.head(n)) / own.sum()));
+    weight.head(n) += own * std::sqrt((own.sum() - 1.0) / left.squaredNorm());
   }
+  solution = (weight.asDiagonal() * design).colPivHouseholderQr().solve(weight.cwiseProduct(level));
   EXPECT_EQ(levels.suspects + levels.references, n);
   EXPECT_NEAR(levels.difference, solution[0] - solution[1], 1e-9);
   // the noise is 1.5 times as large at equal work
