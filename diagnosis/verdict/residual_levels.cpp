@@ -23,14 +23,9 @@ LevelComparison levels_of(const Diagnosis& d, std::size_t channel) {
   return compare_levels(d.evidence, channel, settled(d, channel, d.search.final.residual[channel]));
 }
 
-/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike: Student's, and no
-/// less than one over the number of ways to choose the suspect blocks among all, which is the least that exchangeable levels
-/// allow whatever their distribution (Pitman 1937, J. R. Stat. Soc. Suppl. 4, 119). Three blocks that happen to be alike prove little.
+/// Probability that the mean level of suspect logs exceeds that of the references so far when both are alike.
 double chance_of_level(const LevelComparison& levels) {
-  const double n = levels.suspects, m = levels.references;
-  const double ways = std::lgamma(n + m + 1.0) - std::lgamma(n + 1.0) - std::lgamma(m + 1.0);
-  return std::max(student_tail(levels.difference / std::sqrt(levels.variance), levels.freedom),
-                  std::exp(-ways));
+  return student_tail(levels.difference / std::sqrt(levels.variance), levels.freedom);
 }
 
 /// Probability that the largest block of the suspect logs lies so far above those of the references when all are alike:

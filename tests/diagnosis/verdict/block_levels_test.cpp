@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -123,31 +122,6 @@ TEST(BlockLevels, TheDifferenceIsThatOfLeastSquaresWithTheSlopesOfBothGroups) {
     apart += level[b] * (c.log[static_cast<std::size_t>(b)] == 0 ? 1.0 / levels.suspects
                                                                  : -1.0 / levels.references);
   EXPECT_NEAR(levels.explained, apart - levels.difference, 1e-9);
-}
-
-/// Two and three blocks whose levels happen to be alike differ by chance in one of ten choices at least, whatever a test of normal
-/// deviates says.
-TEST(BlockLevels, FewBlocksProveLittle) {
-  LoadCase c = with_load(1.0, 1.0);
-  EvidenceChannel& channel = c.d.evidence.channels[c.jib];
-  std::vector<NoiseBlock> blocks;
-  std::vector<int> log;
-  for (const int of : {0, 1}) {
-    for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
-      if (channel.log[b] != of || std::count(log.begin(), log.end(), of) == 2 + of) continue;
-      blocks.push_back(channel.blocks[b]);
-      log.push_back(of);
-    }
-  }
-  channel.blocks = blocks;
-  channel.log = log;
-  VectorXd& residual = c.d.search.final.residual[c.jib];
-  for (std::size_t b = 0; b < blocks.size(); ++b)
-    residual.segment(blocks[b].first, blocks[b].last - blocks[b].first)
-        .setConstant(log[b] == 0 ? 100.0 + 1e-3 * static_cast<double>(b)
-                                 : 1.0 + 1e-3 * static_cast<double>(b));
-  c.d.search.final.noise[c.jib] = NoiseModel();
-  EXPECT_NEAR(excess_over_references(c.d, c.jib)->level, 0.1, 1e-12);
 }
 
 }  // namespace
