@@ -42,6 +42,8 @@ std::string parameters_text(const AppliedEffect& e) {
         "{}{} {}{}", text.empty() ? "" : ", ", q.name,
         choice ? fmt::format("{:g}", e.values[p] / q.si) : plain_number(e.values[p] / q.si, 4),
         unit);
+    if (const std::string variant = variant_text(q, e.values[p]); !variant.empty())
+      text += " (" + variant + ")";
     if (!choice && std::isfinite(e.lower95[p])) {
       text += fmt::format(" ({} .. {})", plain_number(e.lower95[p] / q.si, 4),
                           plain_number(e.upper95[p] / q.si, 4));

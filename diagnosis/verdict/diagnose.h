@@ -24,6 +24,7 @@ struct ParameterEstimate {
   double value = 0.0, lower95 = 0.0, upper95 = 0.0;  ///< in `unit`
   bool determined =
       true;  ///< whether the logs determine it (is_determined); if not, no output shows its value
+  std::string variant = {};  ///< of a choice: the variant of the law, in words (variant_text)
 };
 
 /// Error of one evidence channel without and with one effect; all other found effects are included in both.
@@ -33,6 +34,9 @@ struct ChannelGain {
   /// The same errors with the squares of each stretch of motion weighed by the inverse of its variance, where the
   /// search gave the stretches variances of their own; else NaN. [SI]
   double weighed_before = std::numeric_limits<double>::quiet_NaN(), weighed_after = weighed_before;
+  /// What the references leave at the loads and speeds of the suspect logs (expected_rms in residual_levels.h), weighed as `after`.
+  /// [SI] NaN without references.
+  double in_references = std::numeric_limits<double>::quiet_NaN();
 
   /// The errors by which the search judged the effect: weighed where stretches have variances of their own. [SI]
   bool weighed() const { return weighed_before == weighed_before; }

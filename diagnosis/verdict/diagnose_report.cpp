@@ -14,7 +14,9 @@ namespace {
 std::string with_interval(const ParameterEstimate& p) {
   const std::string unit = p.unit.empty() || p.unit == "-" ? "" : " " + p.unit;
   if (!p.determined) return p.name + " is not determined by these logs";
-  if (p.lower95 == p.upper95) return fmt::format("{} = {:g}{}", p.name, p.value, unit);
+  if (p.lower95 == p.upper95)
+    return fmt::format("{} = {:g}{}{}", p.name, p.value, unit,
+                       p.variant.empty() ? "" : " (" + p.variant + ")");
   return fmt::format("{} = {}{} ({} .. {})", p.name, plain_number(p.value, 4), unit,
                      plain_number(p.lower95, 4), plain_number(p.upper95, 4));
 }
@@ -47,6 +49,7 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
                                {"unit", p.unit},
                                {"determined", p.determined},
                                {"ci95", {json_number(p.lower95), json_number(p.upper95)}}});
+    if (!p.variant.empty()) j["parameters"].back()["variant"] = p.variant;
   }
   j["channels"] = nlohmann::json::array();
   for (const ChannelGain& g : e.channels) {
@@ -56,6 +59,8 @@ nlohmann::json json_of(const DiagnosedEffect& e, const Evidence& evidence) {
                              {"rmse_before", g.rmse_before / c.unit.si},
                              {"rmse_after", g.rmse_after / c.unit.si},
                              {"noise_floor", json_number(g.noise_floor / c.unit.si)}});
+    if (std::isfinite(g.in_references))
+      j["channels"].back()["rmse_references"] = g.in_references / c.unit.si;
     if (!g.weighed()) continue;
     j["channels"].back()["rmse_weighed_before"] = g.weighed_before / c.unit.si;
     j["channels"].back()["rmse_weighed_after"] = g.weighed_after / c.unit.si;

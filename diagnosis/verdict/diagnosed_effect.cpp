@@ -75,6 +75,46 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   return fit_effects(updated ? *updated : d.evidence, pointers, nullptr, control);
 }
 
+namespace {
+
+/// The errors of the channels that an effect improves, without and with it, in sentences.
+std::vector<std::string> error_sentences(const Diagnosis& d, const DiagnosedEffect& e,
+                                         const EffectFit& without) {
+  std::vector<std::string> out;
+  const auto rms = [&d](const ChannelGain& g, const VectorXd& residual) {
+    return g.weighed() ? weighed_suspect_rms(d, g.channel, residual)
+                       : suspect_rms(d.evidence, g.channel, residual);
+  };
+  for (const ChannelGain& g : e.channels) {
+    const EvidenceChannel& c = d.evidence.channels[g.channel];
+    if (g.before() < d.thresholds.least_reduction * g.after()) continue;
+    const VectorXd before = settled(d, g.channel, without.residual[g.channel]);
+    const VectorXd after = settled(d, g.channel, d.search.final.residual[g.channel]);
+    const bool settles = d.search.final.noise[g.channel].transient != 1.0;
+    out.push_back(fmt::format(
+        "{}: error{} {} -> {} {}{}{}", c.text,
+        g.weighed() ? ", weighed by the variance of each stretch of motion," : "",
+        plain_number(g.before() / c.unit.si, 3), plain_number(g.after() / c.unit.si, 3),
+        c.unit.name,
+        std::isfinite(g.noise_floor)
+            ? fmt::format(
+                  " (sensor noise {}{})", plain_number(g.noise_floor / c.unit.si, 2),
+                  std::isfinite(g.in_references)
+                      ? ", the references leave " + plain_number(g.in_references / c.unit.si, 3)
+                      : "")
+            : "",
+        settles ? fmt::format("; without starts and stops {} -> {} {}",
+                              plain_number(rms(g, before) / c.unit.si, 3),
+                              plain_number(rms(g, after) / c.unit.si, 3), c.unit.name)
+                : ""));
+    if (&g != &e.channels.front()) continue;
+    if (const std::string left = left_beyond_references(d, g); !left.empty()) out.push_back(left);
+  }
+  return out;
+}
+
+}  // namespace
+
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
                                 const SearchOptions& options) {
   const FoundEffect& f = d.search.found[index];
@@ -92,7 +132,8 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
     if (is_absent(p, f.values[k])) continue;
     e.parameters.push_back({p.name, p.unit, p.meaning, f.values[k] / p.si, f.lower95[k] / p.si,
                             f.upper95[k] / p.si,
-                            is_determined(f.values[k], f.lower95[k], f.upper95[k], p.typical)});
+                            is_determined(f.values[k], f.lower95[k], f.upper95[k], p.typical),
+                            variant_text(p, f.values[k])});
   }
   e.p_value = f.p_value;
   e.gain = f.gain;
@@ -114,38 +155,17 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   const EffectFit without = fit_without(d, index);
   for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
     if (!f.design.touches(c)) continue;
-    e.channels.push_back({c, suspect_rms(d.evidence, c, without.residual[c]),
-                          suspect_rms(d.evidence, c, d.search.final.residual[c]),
-                          d.evidence.channels[c].noise_floor,
-                          weighed_suspect_rms(d, c, without.residual[c]),
-                          weighed_suspect_rms(d, c, d.search.final.residual[c])});
+    e.channels.push_back(
+        {c, suspect_rms(d.evidence, c, without.residual[c]),
+         suspect_rms(d.evidence, c, d.search.final.residual[c]), d.evidence.channels[c].noise_floor,
+         weighed_suspect_rms(d, c, without.residual[c]),
+         weighed_suspect_rms(d, c, d.search.final.residual[c]),
+         d.evidence.has_reference() && !d.stretches_weighed ? expected_rms(d, c) : kNaN});
   }
   std::sort(e.channels.begin(), e.channels.end(), [](const ChannelGain& a, const ChannelGain& b) {
     return a.before() / a.after() > b.before() / b.after();
   });
-  const auto rms = [&d](const ChannelGain& g, const VectorXd& residual) {
-    return g.weighed() ? weighed_suspect_rms(d, g.channel, residual)
-                       : suspect_rms(d.evidence, g.channel, residual);
-  };
-  for (const ChannelGain& g : e.channels) {
-    const EvidenceChannel& c = d.evidence.channels[g.channel];
-    if (g.before() < d.thresholds.least_reduction * g.after()) continue;
-    const VectorXd before = settled(d, g.channel, without.residual[g.channel]);
-    const VectorXd after = settled(d, g.channel, d.search.final.residual[g.channel]);
-    const bool settles = d.search.final.noise[g.channel].transient != 1.0;
-    e.evidence.push_back(fmt::format(
-        "{}: error{} {} -> {} {}{}{}", c.text,
-        g.weighed() ? ", weighed by the variance of each stretch of motion," : "",
-        plain_number(g.before() / c.unit.si, 3), plain_number(g.after() / c.unit.si, 3),
-        c.unit.name,
-        std::isfinite(g.noise_floor)
-            ? fmt::format(" (sensor noise {})", plain_number(g.noise_floor / c.unit.si, 2))
-            : "",
-        settles ? fmt::format("; without starts and stops {} -> {} {}",
-                              plain_number(rms(g, before) / c.unit.si, 3),
-                              plain_number(rms(g, after) / c.unit.si, 3), c.unit.name)
-                : ""));
-  }
+  e.evidence = error_sentences(d, e, without);
   e.evidence.push_back(
       fmt::format("it improves the prediction of motions left out of the estimate, in {:.0f} % of "
                   "the folds and by {:.1f} standard errors",
@@ -153,6 +173,14 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   if (const std::string partial = partial_law(e); !partial.empty())
     e.evidence.insert(e.evidence.begin(), partial);
   return e;
+}
+
+std::string left_beyond_references(const Diagnosis& d, const ChannelGain& g) {
+  if (!(g.after() > d.thresholds.least_excess_ratio * g.in_references)) return {};  // NaN: ""
+  return fmt::format(
+      "what is left there is {:.1f} times what the references leave at the same loads and speeds: "
+      "another form of this effect, or a second cause, acts as well",
+      g.after() / g.in_references);
 }
 
 std::string partial_law(const DiagnosedEffect& e) {

@@ -23,4 +23,7 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
 /// @return a sentence where the 95 % interval of that share excludes one, so that another law may be the cause; else ""
 std::string partial_law(const DiagnosedEffect& e);
 
+/// @return a sentence where the references leave much less than the effect leaves in a channel, so that it is not all; else ""
+std::string left_beyond_references(const Diagnosis& d, const ChannelGain& g);
+
 }  // namespace sparflow

@@ -201,6 +201,13 @@ Matrix inertial_columns(const Effect& effect, const MachineSeries& log,
   return columns;
 }
 
+std::string variant_text(const EffectParameter& p, double value) {
+  for (std::size_t i = 0; i < p.variants.size(); ++i) {
+    if (p.grid[i] == value) return p.variants[i];
+  }
+  return "";
+}
+
 std::string effect_key(const EffectInfo& info, const Machine& machine, int at) {
   const auto i = static_cast<std::size_t>(at);
   switch (info.place) {

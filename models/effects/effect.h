@@ -36,10 +36,15 @@ struct EffectParameter {
   /// A parameter without which the effect is complete; a search adds it only where the log determines it. A nonlinear one is absent
   /// where it is zero; an effect has all of its optional nonlinear parameters or none, except those whose grid contains zero.
   bool optional = false;
+  std::vector<std::string> variants =
+      {};  ///< of a choice: the law with each value of `grid`, in words
 };
 
 /// Whether an optional parameter takes no part in an effect; no output names it then.
 inline bool is_absent(const EffectParameter& p, double value) { return p.optional && value == 0.0; }
+
+/// The variant of the law that a value of a choice names, in words; "" for every other parameter.
+std::string variant_text(const EffectParameter& p, double value);
 
 struct EffectInfo {
   std::string id;

@@ -139,6 +139,22 @@ TEST(DiagnosePage, ShowsTheErrorAsTheSearchWeighsIt) {
   EXPECT_THAT(html, HasSubstr("weighed, without it"));
 }
 
+/// Beside references the error is compared with what these leave, and a variant of a law is told in words.
+TEST(DiagnosePage, ShowsWhatTheReferencesLeaveAndTheVariantInWords) {
+  const CraneModel model = arm_model();
+  Diagnosis d = missing_friction(model);
+  ASSERT_FALSE(d.effects[0].channels.empty());
+  EXPECT_THAT(diagnose_page(model, d).html(), ::testing::Not(HasSubstr("in the references")));
+  d.effects[0].channels[0].in_references = 0.5 * d.effects[0].channels[0].rmse_before;
+  d.effects[0].parameters.push_back(
+      {"form", "-", "", 2.0, 2.0, 2.0, true, "the highest load starves"});
+  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("in the references"));
+  EXPECT_THAT(diagnose_page(model, d).html(), HasSubstr("form 2 (the highest load starves)"));
+  EXPECT_THAT(d.table(), HasSubstr("form = 2 (the highest load starves)"));
+  EXPECT_THAT(d.json(), HasSubstr("\"variant\": \"the highest load starves\""));
+  EXPECT_THAT(d.json(), HasSubstr("\"rmse_references\""));
+}
+
 TEST(DiagnosePage, ChannelPictureRemovesTheEffect) {
   const CraneModel model = arm_model();
   const Diagnosis d = missing_friction(model);

@@ -60,6 +60,8 @@ std::string gain_text(const Diagnosis& d, const ChannelGain& g) {
   if (g.weighed()) text += " (weighed by the variance of each stretch of motion)";
   if (std::isfinite(g.noise_floor))
     text += fmt::format(", sensor noise {}", display_number(g.noise_floor * scale, 2));
+  if (std::isfinite(g.in_references))
+    text += fmt::format(", in the references {}", display_number(g.in_references * scale, 2));
   return text;
 }
 
@@ -126,6 +128,8 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
   errors.columns = {
       {"effect"}, {"quantity"}, {"without it", "", 3}, {"with it", "", 3}, {"sensor noise", "", 3},
       {"unit"}};
+  const bool references = d.evidence.has_reference() && !d.stretches_weighed;
+  if (references) errors.columns.insert(errors.columns.end() - 1, {"references leave", "", 3});
   if (d.stretches_weighed)
     errors.columns.insert(errors.columns.begin() + 2,
                           {{"weighed, without it", "", 3}, {"weighed, with it", "", 3}});
@@ -140,12 +144,14 @@ void add_effects(Page& page, const Machine& machine, const Diagnosis& d) {
                                     g.rmse_after * scale,
                                     std::isfinite(g.noise_floor) ? g.noise_floor * scale : kNaN,
                                     name};
+      if (references) row.insert(row.end() - 1, g.in_references * scale);
       if (d.stretches_weighed)
         row.insert(row.begin() + 2, {g.weighed_before * scale, g.weighed_after * scale});
       errors.rows.push_back(std::move(row));
     }
   }
   errors.note = "RMS. All other effects found are in the model in both columns.";
+  if (references) errors.note += " The references' residual is taken at the same loads and speeds.";
   if (d.stretches_weighed)
     errors.note +=
         " Weighed: with the squares of each stretch of motion over its own variance, as the search "

@@ -37,9 +37,10 @@ std::string parameter_text(const ParameterEstimate& p) {
   }
   const double value = scale * p.value, lower = scale * p.lower95, upper = scale * p.upper95;
   const std::string tail = unit.empty() || unit == "-" ? "" : " " + unit;
+  if (!p.variant.empty()) return fmt::format("{} {:g} ({})", p.name, value, p.variant);
   if (!std::isfinite(lower) || !std::isfinite(upper))
     return fmt::format("{} {}{}", p.name, display_number(value, 4), tail);
-  if (lower == upper) return fmt::format("{} {:g}{}", p.name, value, tail);  // a variant of a law
+  if (lower == upper) return fmt::format("{} {:g}{}", p.name, value, tail);
   const double half = 0.5 * (upper - lower);
   const int digits = digits_for(value, half);
   if (std::abs(value - 0.5 * (lower + upper)) < 0.05 * half) {
@@ -69,7 +70,8 @@ std::vector<ParameterEstimate> estimates_of(const AppliedEffect& effect) {
          known ? effect.lower95[i] / p.si : std::nan(""),
          known ? effect.upper95[i] / p.si : std::nan(""),
          !known || p.choice ||
-             is_determined(effect.values[i], effect.lower95[i], effect.upper95[i], p.typical)});
+             is_determined(effect.values[i], effect.lower95[i], effect.upper95[i], p.typical),
+         variant_text(p, effect.values[i])});
   }
   return out;
 }

@@ -1,6 +1,7 @@
 /// What suspect logs and references leave unexplained: equal sizes are no change only where the law is the same.
 #include "diagnosis/verdict/residual_levels.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -180,6 +181,17 @@ TEST(ResidualLevels, AnEffectThatExplainsLittleIsMinor) {
   d.evidence.suspects = 2;  // no references
   EXPECT_TRUE(minor(6.0));
   EXPECT_FALSE(minor(20.0));
+}
+
+/// What is left beside a named effect is said where it is more than twice what the references leave.
+TEST(ResidualLevels, WhatAnEffectLeavesBeyondTheReferencesIsSaid) {
+  Diagnosis d;
+  ChannelGain g{0, 29.1e5, 17.6e5, 1e4};
+  EXPECT_EQ(left_beyond_references(d, g), "");  // no references
+  g.in_references = 8.3e5;
+  EXPECT_THAT(left_beyond_references(d, g), ::testing::HasSubstr("2.1 times what the references"));
+  g.in_references = 8.9e5;
+  EXPECT_EQ(left_beyond_references(d, g), "");
 }
 
 /// What the references leave as well is no sign against an effect in the suspect log, unless it has the opposite sign.

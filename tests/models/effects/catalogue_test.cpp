@@ -23,6 +23,10 @@ TEST(Catalogue, EveryEntryIsCompleteAndPlausible) {
       EXPECT_FALSE(p.meaning.empty()) << p.name;
       EXPECT_FALSE(p.linear && shapes) << "linear parameters come first";
       shapes = shapes || !p.linear;
+      EXPECT_EQ(p.variants.size(), p.choice ? p.grid.size() : 0u) << p.name;
+      for (std::size_t v = 0; v < p.variants.size(); ++v)
+        EXPECT_EQ(variant_text(p, p.grid[v]), p.variants[v]);
+      EXPECT_EQ(variant_text(p, -0.25), "") << p.name;
     }
     EXPECT_NE(effect_table().find(effect_signature(info)), std::string::npos);
     const std::string entry = effect_entry(*e);

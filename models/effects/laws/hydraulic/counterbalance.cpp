@@ -50,7 +50,9 @@ class Counterbalance final : public Effect {
                         "-1: the valve acts while retracting, 1: while extending",
                         false,
                         {-1.0, 1.0},
-                        true}},
+                        true,
+                        false,
+                        {"while retracting", "while extending"}}},
         .equation =
             "p_supply = max(static branch, setting - slope p_load), p_load = -side F/A_hold",
         .signals = {"both chamber pressures", "position"},

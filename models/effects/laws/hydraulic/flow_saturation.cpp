@@ -60,7 +60,10 @@ class FlowSaturation final : public Effect {
               "pump_lag, where a model has that), in starts and stops as well",
               false,
               {0.0, 1.0, 2.0, 3.0},
-              true}},
+              true,
+              false,
+              {"flow shared", "flow shared, smooth limit", "not shared: the highest load starves",
+               "limit in the line's flow balance"}}},
         .equation =
             "Q_i = s Q_i(u), s = min(1, limit / sum of Q(u)), soft: (1 + (sum / "
             "limit)^12)^(-1/12), "

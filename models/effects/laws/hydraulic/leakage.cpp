@@ -36,7 +36,11 @@ class Leakage final : public Effect {
                         "pressures follow the flow over the return edge by the learned laws",
                         false,
                         {0.0, 1.0, 2.0, 3.0},
-                        true}},
+                        true,
+                        false,
+                        {"past the closed spool, at rest", "past the piston",
+                         "past the piston, tight ports",
+                         "past the piston, tight ports, pressures follow"}}},
         .equation =
             "dx/dt = Q_valve/A - F k/A_hold^2; tight ports: dx/dt = Q_valve/A - k (p_A - "
             "p_B)/A_supply in motion",

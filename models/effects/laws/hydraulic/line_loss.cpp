@@ -49,7 +49,9 @@ class LineLoss final : public Effect {
                         "0: pressure sensors at the cylinder, 1: at the valve",
                         false,
                         {0.0, 1.0},
-                        true}},
+                        true,
+                        false,
+                        {"sensors at the cylinder", "sensors at the valve"}}},
         .equation =
             "dp = k Q^2 + k1 Q; p_pump += dp while the cylinder is the load-sensing leader, or "
             "(sensor at the valve) p_supply += dp and F += A_supply dp; beside "

@@ -36,7 +36,9 @@ class PressureOffset final : public Effect {
                         "1: sensor of the bore side (A), -1: sensor of the rod side (B)",
                         false,
                         {1.0, -1.0},
-                        true}},
+                        true,
+                        false,
+                        {"bore side, A", "rod side, B"}}},
         .equation =
             "p_A (or p_B) measured = true + offset; measured force = true + A_A offset (or - A_B "
             "offset)",

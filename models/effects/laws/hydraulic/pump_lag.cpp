@@ -79,6 +79,14 @@ class PumpLag final : public Effect {
   }
 
  private:
+  static std::vector<std::string> variants() {
+    return {"first order",
+            "two stages",
+            "two stages, rising faster",
+            "second order that swings",
+            "built up by its own margin",
+            "flow balance of the pump's line"};
+  }
   static std::vector<EffectParameter> parameters() {
     return {{"share",
              "-",
@@ -105,15 +113,14 @@ class PumpLag final : public Effect {
              0.0,
              5.0,
              0.0,
-             "0: first order, 1: two equal stages, 2: two equal stages, rising four times "
-             "as fast as falling, 3: second order that swings (hunting regulator, "
-             "damping ratio 0.3), 4: first order, built up by its own margin (the load-sensing "
-             "port sees no more than the pump's pressure until the load's check valve opens), 5: "
-             "flow balance of the pump's line, regulator with proportional and integral action "
-             "of which tau is the time constant in front of closed valves",
+             "variant of the law; 2 rises four times as fast as it falls, 3 has the damping ratio "
+             "0.3, in 4 the load-sensing port sees no more than the pump's pressure until the "
+             "load's check valve opens, in 5 tau is the regulator's before closed valves",
              false,
              {0.0, 1.0, 2.0, 3.0, 4.0, 5.0},
-             true},
+             true,
+             false,
+             variants()},
             {"rest",
              "s",
              1.0,

@@ -51,7 +51,9 @@ class SensorDelay final : public Effect {
                         "only the position of the first, second ... joint is late",
                         false,
                         {1.0, -1.0},
-                        true}},
+                        true,
+                        false,
+                        {"all positions", "forces or pressures"}}},
         .equation =
             "F(t) = F_static(t + late delay); positions late: dx/dt logged at t is that at t - "
             "delay",

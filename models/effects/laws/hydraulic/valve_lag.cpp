@@ -42,7 +42,9 @@ class ValveLag final : public Effect {
                         "spool), 1: pure delay of tau",
                         false,
                         {0.0, 0.5, 1.0},
-                        true}},
+                        true,
+                        false,
+                        {"first order", "two stages", "pure delay"}}},
         .equation =
             "tau dQ/dt + Q = Q_valve(u), or (tau/2 d/dt + 1)^2 Q = Q_valve(u), or Q(t) = "
             "Q_valve(u(t - tau))",

@@ -54,7 +54,10 @@ class ValvePressureDrop final : public Effect {
                         "flow rises beyond",
                         false,
                         {1.0, 2.0, 0.0},
-                        true}},
+                        true,
+                        false,
+                        {"compensator before the edge", "compensator behind the edge, flow shared",
+                         "compensator has failed"}}},
         .equation =
             "Q = Q_valve(u) (max(0, p_pump - p) / setting)^0.5, with a compensator at most "
             "Q_valve(u); p = pressure of the supply chamber, with flow sharing the highest of "

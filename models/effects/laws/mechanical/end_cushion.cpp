@@ -70,7 +70,9 @@ class EndCushion final : public Effect {
               "0: at both ends, 1: at the extended end only, -1: at the retracted end only",
               false,
               {0.0, 1.0, -1.0},
-              true}},
+              true,
+              false,
+              {"at both ends", "at the extended end", "at the retracted end"}}},
         .equation =
             "F = F_static + force ((zone - distance to the stop)/zone)^2 sign(v) inside the "
             "zone, towards the stop only",
