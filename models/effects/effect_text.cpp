@@ -105,7 +105,12 @@ std::string parameter_words(const EffectParameter& p) {
   text += fmt::format(", typical {:.3g}{}", shown(p, p.typical), unit);
   if (p.linear) return text;
   std::vector<std::string> values;
-  for (const double v : p.grid) values.push_back(fmt::format("{:.3g}", shown(p, v)));
+  for (const double v : p.grid) {
+    const std::string variant = variant_text(p, v);
+    values.push_back(
+        fmt::format("{:.3g}{}", shown(p, v), variant.empty() ? "" : " (" + variant + ")"));
+  }
+  if (p.choice) return text + "; one of " + joined(values);
   text += values.empty() ? "; searched" : fmt::format("; searched from {}", joined(values));
   return text;
 }

@@ -1,4 +1,7 @@
+#include <type_traits>
+
 #include "models/effects/builtin.h"
+#include "models/machine/inertial_derivatives.h"
 #include "models/machine/inertial_torque.h"
 #include "models/math/jet.h"
 
@@ -47,6 +50,16 @@ class Inertia final : public Effect {
   void add_force_law(const Instant<T>& s, int, std::span<const double> p, std::span<T> out) const {
     if (p[0] == 0.0) return;
     using Vector = Eigen::Matrix<T, Eigen::Dynamic, 1>;
+    if constexpr (std::is_same_v<T, Jet>) {
+      const std::vector<Jet> fast =
+          inertial_torque_of_variables(*s.machine, s.q, s.qd, s.qdd, s.payload);
+      if (!fast.empty()) {
+        for (std::size_t i = 0; i < out.size(); ++i)
+          out[i] +=
+              p[0] * fast[static_cast<std::size_t>(s.machine->cylinders[i].joint)] / s.rate[i];
+        return;
+      }
+    }
     const auto n = static_cast<Eigen::Index>(s.q.size());
     const Vector torque = inertial_torque<T>(*s.machine, Eigen::Map<const Vector>(s.q.data(), n),
                                              Eigen::Map<const Vector>(s.qd.data(), n),
