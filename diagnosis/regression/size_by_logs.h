@@ -18,6 +18,7 @@ struct SizeInLogs {
 
 struct SizeByLogs {
   SizeInLogs suspects, references;
+  double covariance = 0.0;  ///< [1] of both sizes, by what the baseline follows of either
   double freedom = 0.0;  ///< degrees of freedom of the scatter; 0: how the size varies is not known
   double variation =
       0.0;  ///< [1] standard deviation of the size that was added between stretches of motion

@@ -49,6 +49,17 @@ struct Drawn {
       }
     }
   }
+  /// Lets the baseline follow most of the effect, by another law in either group of logs as learned laws do.
+  void absorb(unsigned seed) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    EvidenceChannel& c = evidence.channels[0];
+    c.baseline.conservativeResize(Eigen::NoChange, 2);
+    for (Index r = 0; r < c.y.size(); ++r) {
+      const double here = suspect.columns[0](r, 0), there = reference.columns[0](r, 0);
+      c.baseline(r, 1) = 1.4 * here + 0.7 * there + 0.6 * normal(random);
+    }
+  }
   SizeByLogs sizes() const {
     return size_by_logs(evidence, {suspect, reference, VectorXd::Zero(1), VectorXd::Ones(1), none},
                         fit);
@@ -84,6 +95,27 @@ TEST(SizeByLogs, ADifferenceBeyondTheVariationIsSeen) {
   const SizeByLogs s = Drawn(1.0, 0.2, 0.3, 20, 3).sizes();
   EXPECT_GT(s.difference(), 4.0);  // 0.8 over 0.3 sqrt(2/20) is 8.4
   EXPECT_GT(s.mean(), 4.0);
+}
+
+/// What a law learned from all logs follows of a change shows in the references with the opposite sign. Sizes are estimated together with
+/// it, so that neither group's is drawn towards the other's.
+TEST(SizeByLogs, WhatTheBaselineFollowsDrawsNoSizeTowardsTheOther) {
+  Drawn d(1.0, 0.0, 0.0, 20, 5);
+  d.absorb(6);
+  const SizeByLogs s = d.sizes();
+  EXPECT_NEAR(s.suspects.size, 1.0, 4.0 * s.suspects.standard_error);
+  EXPECT_NEAR(s.references.size, 0.0, 4.0 * s.references.standard_error);
+  EXPECT_LT(s.suspects.standard_error, 0.05);
+  int beyond = 0;
+  constexpr int kDraws = 400;
+  for (unsigned seed = 0; seed < kDraws; ++seed) {
+    Drawn alike(1.0, 1.0, 0.0, 20, 1000 + seed);
+    alike.absorb(2000 + seed);
+    beyond += std::abs(alike.sizes().difference()) > 1.96 ? 1 : 0;
+  }
+  // as above: without the covariance of both sizes they are two, with sizes that are estimated apart as many as here
+  EXPECT_GT(beyond, 6);
+  EXPECT_LT(beyond, 44);
 }
 
 /// A log in which the effect does not act says nothing of its size.
