@@ -333,11 +333,12 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
     return {InReferences::kNot, here.blocks == 0                           ? Proof::kClearExcess
                                 : certain(here.size / here.standard_error) ? Proof::kNone
                                                                            : Proof::kExcess};
-  // The references cannot tell whether they have it.
-  if (!significant(here.size / there.standard_error))
-    return {InReferences::kNot, here.blocks == 0              ? Proof::kClearExcess
-                                : certain(sizes.difference()) ? Proof::kNone
-                                                              : Proof::kExcess};
+  // The references cannot tell whether they have it, so that a residual that exceeds theirs says only that these motions show it.
+  if (!significant(here.size / there.standard_error)) {
+    if (here.blocks == 0) return {InReferences::kNot, Proof::kClearExcess};
+    if (!significant(sizes.difference())) return {InReferences::kVaries, Proof::kClearExcess};
+    return {InReferences::kNot, certain(sizes.difference()) ? Proof::kNone : Proof::kExcess};
+  }
   // of several parameters only one may have changed
   const VectorXd in_reference = apart.theta.tail(suspect.linear);
   const SizeByLogs change = size_by_logs(

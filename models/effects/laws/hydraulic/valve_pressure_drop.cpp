@@ -25,7 +25,7 @@ class ValvePressureDrop final : public Effect {
         .parameters = {{"share",
                         "-",
                         1.0,
-                        0.1,
+                        0.5,
                         2.0,
                         1.0,
                         "share of the flow that follows the pressure drop, about 1",
