@@ -92,6 +92,25 @@ std::vector<LogFault> sensor_faults(const Diagnosis& d, const std::vector<LogFau
   return out;
 }
 
+/// Drops effects that lower the error of no channel by as much as a report states as evidence: long logs prove what nobody can see, and
+/// so small a part of a residual is as well one of a law that is not exact.
+void drop_unseen_effects(Diagnosis& d) {
+  if (!d.evidence.options.mechanisms.act(Mechanism::kSize)) return;
+  std::vector<FoundEffect>& found = d.search.found;
+  const std::size_t before = found.size();
+  for (std::size_t i = found.size(); i-- > 0;) {
+    const double reduction = largest_reduction(d, i);
+    if (!(reduction < d.thresholds.least_reduction)) continue;
+    const EffectAt& effect = found[i].design.effect;
+    d.notes.push_back(
+        fmt::format("{} is not named: it lowers no error by more than {:.1f} %",
+                    effect_key(effect.effect->info(), *d.evidence.series[0].machine, effect.at),
+                    100.0 * (1.0 - 1.0 / d.thresholds.least_reduction)));
+    found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  if (found.size() < before) d.search.final = fit_without(d, found.size());
+}
+
 /// Drops minor effects when other effects remain; their error becomes `unexplained`.
 /// @return whether there were any
 bool drop_minor_effects(Diagnosis& d, const SearchOptions& options) {
@@ -318,6 +337,7 @@ Diagnosis diagnose_once(const CraneModel& model, const DiagnosisSignals& signals
                                 options.evidence);
   d.notes = d.evidence.notes;
   search(model, options, progress, d);
+  drop_unseen_effects(d);
   set_joint_estimates(model, signals, options.evidence, d);
   if (progress) progress(0.92, "searching for unmodelled structure in the residual");
   // in the residual of the effects that are findings

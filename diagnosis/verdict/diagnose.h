@@ -167,8 +167,8 @@ struct VerdictOptions {
   /// @threshold [effects] 1..20; chosen: friction, the valve's lag and pressure drop, and compressibility of each cylinder. With eight
   /// for a machine of four cylinders the noise of a jib's force was 1.8 kN in place of 0.3 kN, its Coulomb friction being left out
   int effects_lacking_by_cylinder = 4;
-  /// Factor by which an effect must reduce a channel's error for that to be stated as evidence.
-  /// @threshold [1] 1..; chosen: two percent; a smaller change is no evidence to a reader.
+  /// Factor by which an effect must reduce a channel's error to be named, and for that to be stated as evidence.
+  /// @threshold [1] 1..; chosen: two percent; less is no evidence to a reader, and true effects reduce more (docs/history/references.md).
   double least_reduction = 1.02;
   /// Absorbed share above which the table states it.
   /// @threshold [1] 0..1; chosen: a twentieth; the table states what matters.

@@ -75,6 +75,18 @@ EffectFit fit_without(const Diagnosis& d, std::size_t index) {
   return fit_effects(updated ? *updated : d.evidence, pointers, nullptr, control);
 }
 
+double largest_reduction(const Diagnosis& d, std::size_t index) {
+  const EffectFit without = fit_without(d, index);
+  double most = 0.0;
+  for (std::size_t c = 0; c < d.evidence.channels.size(); ++c) {
+    if (!d.search.found[index].design.touches(c)) continue;
+    const std::vector<double> weights = d.block_weights(c);
+    most = std::max(most, weighed_rms(d.evidence, c, without.residual[c], weights) /
+                              weighed_rms(d.evidence, c, d.search.final.residual[c], weights));
+  }
+  return most;
+}
+
 namespace {
 
 /// The errors of the channels that an effect improves, without and with it, in sentences.

@@ -15,6 +15,10 @@ double weighed_suspect_rms(const Diagnosis& d, std::size_t channel,
 /// @param index of the found effect to leave out; the number of found effects leaves out none
 EffectFit fit_without(const Diagnosis& d, std::size_t index);
 
+/// Largest ratio, over the channels in which a found effect acts, of the error without it to that with it, as the search weighed
+/// them. [-]
+double largest_reduction(const Diagnosis& d, std::size_t index);
+
 /// Describes a found effect in words and numbers, with the errors without and with it.
 DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
                                 const SearchOptions& options);

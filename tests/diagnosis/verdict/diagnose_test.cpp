@@ -145,6 +145,19 @@ TEST(Diagnose, CoulombFriction) {
   EXPECT_LT(e.channels[0].rmse_after, 0.7 * e.channels[0].rmse_before);
 }
 
+/// A long log proves what no error shows: an effect must reduce one of them by a factor (two percent, here a thousandfold).
+TEST(Diagnose, WhatLowersNoErrorIsNotNamed) {
+  const HiddenCase logs =
+      hidden_case(crane(), {{"coulomb_friction", "boom", 1.0, 1}}, {kSeed, kSeconds});
+  DiagnoseOptions options;
+  options.verdict.least_reduction = 1000.0;
+  const Diagnosis d = diagnose(learned(crane(), logs.train), {logs.train}, {}, options);
+  EXPECT_THAT(d.effects, IsEmpty());
+  EXPECT_NE(d.verdict, Verdict::kMissing);
+  EXPECT_THAT(
+      d.table(),
+      HasSubstr("coulomb_friction:boom is not named: it lowers no error by more than 99.9 %"));
+}
 TEST(Diagnose, Mass) {
   const Answer a = alone({{"unmodelled_mass", "jib", 1.0, 0}});
   EXPECT_EQ(a.diagnosis.verdict, Verdict::kMissing);
