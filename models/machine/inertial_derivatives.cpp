@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "models/machine/inertial_masses.h"
 #include "models/machine/kinematics.h"
 #include "models/machine/linkage.h"
 #include "models/math/taylor.h"
@@ -305,15 +306,7 @@ std::vector<Jet> inertial_torque_of_variables(const Machine& machine, const std:
     }
   }
   ClosedForm form(machine, values[0], values[1], values[2]);
-  for (const Link& link : machine.links) form.add_link(link);
-  if (payload > 0.0 && machine.tip.joint >= 0) {
-    Link load;
-    load.joint = machine.tip.joint;
-    load.mass = machine.tip.payload_scale * payload;
-    load.cog = machine.tip.xyz;
-    form.add_link(load);
-  }
-  for (int c = 0; c < machine.cylinder_count(); ++c) form.add_linkage(c);
+  add_all_masses(machine, payload, form);
   const Derivatives& d = form.result();
 
   std::vector<Jet> torque;

@@ -1,5 +1,6 @@
 #include "models/machine/inertial_torque.h"
 
+#include "models/machine/inertial_masses.h"
 #include "models/machine/linkage.h"
 #include "models/math/jet.h"
 #include "models/math/taylor.h"
@@ -183,15 +184,7 @@ template <class T>
 Vector<T> inertial_torque(const Machine& machine, const Vector<T>& q, const Vector<T>& qd,
                           const Vector<T>& qdd, double payload) {
   NewtonEuler<T> dynamics(machine, q, qd, qdd);
-  for (const Link& link : machine.links) dynamics.add_link(link);
-  if (payload > 0.0 && machine.tip.joint >= 0) {
-    Link load;
-    load.joint = machine.tip.joint;
-    load.mass = machine.tip.payload_scale * payload;
-    load.cog = machine.tip.xyz;
-    dynamics.add_link(load);
-  }
-  for (int c = 0; c < machine.cylinder_count(); ++c) dynamics.add_linkage(c);
+  add_all_masses(machine, payload, dynamics);
   return dynamics.torque();
 }
 
