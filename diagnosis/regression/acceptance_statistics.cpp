@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/regression/bounded_estimate.h"
+#include "diagnosis/regression/scatter_of_sizes.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
 
@@ -27,15 +29,6 @@ struct Layout {  // of the designs' parameters
     }
   }
 };
-
-/// Solves n x = g with a ridge that only matters where the data do not determine x.
-VectorXd solve(MatrixXd n, const VectorXd& g) {
-  if (g.size() == 0) return g;
-  const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  n = scale.asDiagonal() * n * scale.asDiagonal();
-  n.diagonal().array() += 1e-9;
-  return scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
-}
 
 double size_where_it_acts(const VectorXd& action) {
   return std::sqrt(action.array().pow(4).sum() / action.squaredNorm());
@@ -143,23 +136,17 @@ struct Prediction {
   double product;  ///< of the predicted action with what the stretch shows
 };
 
-/// One-sided chance of gains as large. What the stretches show is the slope times what is predicted in them: one of an effect that acts
-/// as predicted, and below one half nothing is gained. The slope is a regression through the origin with variances in proportion to the
-/// information of the stretches (Cochran 1977, Sampling Techniques, section 6.7), at least those of the noise.
+/// One-sided chance of gains as large. What the stretches show is a multiple of what is predicted in them: one of an effect that acts as
+/// predicted, and below one half nothing is gained. The multiples scatter as sizes do (scatter_of_sizes.h), so that a single stretch in
+/// which much is predicted does not decide alone where the law has another size in every motion.
 double chance_of_gains(const std::vector<Prediction>& stretches) {
-  double squares = 0.0, products = 0.0, scatter = 0.0, count = 0.0;
-  for (const Prediction& p : stretches) {
-    if (!(p.square > 0.0)) continue;
-    squares += p.square;
-    products += p.product;
-    count += 1.0;
-  }
-  if (count < 2.0) return 1.0;
-  const double slope = products / squares;
+  std::vector<BlockSize> multiples;
   for (const Prediction& p : stretches)
-    if (p.square > 0.0) scatter += std::pow(p.product - slope * p.square, 2) / p.square;
-  const double variance = std::max(1.0, scatter / (count - 1.0)) / squares;
-  return student_tail((slope - 0.5) / std::sqrt(variance), count - 1.0);
+    if (p.square > 0.0) multiples.push_back({p.product / p.square, p.square});
+  if (multiples.size() < 2) return 1.0;
+  const MeanSize mean = mean_size(multiples, variation_of({&multiples}));
+  return student_tail((mean.size - 0.5) / mean.standard_error,
+                      static_cast<double>(multiples.size()) - 1.0);
 }
 
 /// A stretch of motion in which an effect acts.
@@ -235,14 +222,15 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
       others.push_back(i);
   }
+  const ParameterBounds bounds = bounds_of(designs);
   std::vector<double> gains;
   std::vector<Prediction> by_stretch;
   for (std::size_t f = 0; f < count; ++f) {
     const MatrixXd nf = n_all - data.n[f];
     const VectorXd gf = g_all - data.g[f];
-    const VectorXd with = solve(nf, gf);
+    const VectorXd with = solve_bounded(nf, gf, bounds);
     VectorXd without = VectorXd::Zero(layout.count);
-    without(others) = solve(nf(others, others), gf(others));
+    without(others) = solve_bounded(nf(others, others), gf(others), bounds.of(others));
     // squared error on the fold, up to a constant: theta'N theta - 2 g'theta
     const auto error = [&](const VectorXd& theta) {
       return theta.dot(data.n[f] * theta) - 2.0 * data.g[f].dot(theta);

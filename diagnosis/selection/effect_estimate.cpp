@@ -286,7 +286,7 @@ class Estimator {
     for (const FoundEffect& f : found) {
       const EffectAt& e = f.design.effect;
       if (machine || !e.effect->changes_machine())
-        out.push_back({e.effect, e.at, f.values, f.lower95, f.upper95});
+        out.push_back({e.effect, e.at, f.values, f.lower95, f.upper95, f.covariance});
     }
     return out;
   }

@@ -104,6 +104,28 @@ void drop_same_actions(const Evidence& evidence, std::vector<EffectDesign>& desi
   }
 }
 
+/// Covariance of the values in the order of info().parameters: that of sampling, and beside it the model-form error of each. Choices
+/// have none. @param columns of the linear parameters and then of the nonlinear ones
+Eigen::MatrixXd covariance_of(const Effect& effect, const VectorXd& linear,
+                              const Eigen::MatrixXd& columns, const std::vector<double>& values) {
+  const std::vector<EffectParameter>& parameters = effect.info().parameters;
+  const auto n = static_cast<Eigen::Index>(parameters.size());
+  std::vector<Eigen::Index> own;
+  Eigen::Index l = 0, s = linear.size();
+  for (const EffectParameter& p : parameters) own.push_back(p.linear ? l++ : s++);
+  Eigen::MatrixXd out = columns(own, own);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    if (parameters[at].choice) {
+      out.row(k).setZero();
+      out.col(k).setZero();
+    } else {
+      out(k, k) += std::pow(effect.info().form_error * values[at], 2);
+    }
+  }
+  return out;
+}
+
 /// A linear parameter that acts in no channel gets an interval that says nothing; where it cannot be zero, its typical value,
 /// too. An optional one is absent then.
 void set_undetermined(const EffectDesign& design, FoundEffect& f) {
@@ -116,6 +138,10 @@ void set_undetermined(const EffectDesign& design, FoundEffect& f) {
     if (parameters[k].lower > 0.0) f.values[k] = parameters[k].typical;
     f.lower95[k] = f.values[k] - half;
     f.upper95[k] = f.values[k] + half;
+    const auto at = static_cast<Eigen::Index>(k);
+    f.covariance.row(at).setZero();
+    f.covariance.col(at).setZero();
+    f.covariance(at, at) = std::pow(half / kTwoSided95, 2);
   }
 }
 
@@ -163,6 +189,8 @@ void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& foun
       f.lower95[k] -= whole;
       f.upper95[k] += whole;
     }
+    f.covariance = covariance_of(effect, fit.theta.segment(plain, linear),
+                                 sloped.covariance.block(at, at, sd.size(), sd.size()), f.values);
     set_undetermined(plain_designs[i], f);
     plain += linear;
     at += designs[i].linear;

@@ -12,7 +12,7 @@
 
 namespace sparflow {
 
-/// Fills in values, lower95, upper95 [SI] and not_significant of each effect.
+/// Fills in values, lower95, upper95, covariance [SI] and not_significant of each effect.
 void estimate_intervals(const Evidence& evidence, std::vector<FoundEffect>& found);
 
 /// Whether the logs determine the value of parameter `p` of an effect (is_determined); true where it has no interval.

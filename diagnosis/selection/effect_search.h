@@ -129,6 +129,7 @@ struct FoundEffect {
   bool not_significant = false;
   bool at_bound = false;                         ///< a parameter lies on its bound
   std::vector<double> values, lower95, upper95;  ///< [SI] by parameter
+  Eigen::MatrixXd covariance;                    ///< [SI] of the values
   /// Other effects that could replace it, best first, with how much smaller their gain is. [nats]
   std::vector<std::pair<EffectAt, double>> alternatives;
 };

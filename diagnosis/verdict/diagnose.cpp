@@ -190,6 +190,7 @@ void set_joint_estimates(const CraneModel& model, const DiagnosisSignals& signal
     found[i].values = all.effects[i].values;
     found[i].lower95 = all.effects[i].lower95;
     found[i].upper95 = all.effects[i].upper95;
+    found[i].covariance = all.effects[i].covariance;
   }
 }
 

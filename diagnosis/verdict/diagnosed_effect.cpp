@@ -138,7 +138,7 @@ DiagnosedEffect describe_effect(const Diagnosis& d, std::size_t index,
   const std::string key = effect_key(info, machine, e.effect.at);
   e.at = key.size() > info.id.size() ? key.substr(info.id.size() + 1) : "";
   e.stage = effect_stage_name(info.stage);
-  e.applied = {e.effect.effect, e.effect.at, f.values, f.lower95, f.upper95};
+  e.applied = {e.effect.effect, e.effect.at, f.values, f.lower95, f.upper95, f.covariance};
   for (std::size_t k = 0; k < info.parameters.size(); ++k) {
     const EffectParameter& p = info.parameters[k];
     if (is_absent(p, f.values[k])) continue;

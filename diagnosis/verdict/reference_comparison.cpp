@@ -19,7 +19,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 AppliedEffect applied_of(const FoundEffect& f) {
-  return {f.design.effect.effect, f.design.effect.at, f.values, f.lower95, f.upper95};
+  return {f.design.effect.effect, f.design.effect.at, f.values, f.lower95, f.upper95, f.covariance};
 }
 
 /// Its channels in another evidence; what that does not have is left out.

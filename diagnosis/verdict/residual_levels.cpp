@@ -41,6 +41,18 @@ double chance_of_largest(const LevelComparison& levels, double excess) {
   return levels.suspects * std::max(student_tail(z, levels.references - 1.0), laplace);
 }
 
+/// Whether something is significantly more than a multiple of what the references have, at equal work: other motions alone change a
+/// strength as they change the levels of the residual, and the slopes by which equal work is compared are estimates themselves.
+/// @param here, there RMS @param ratio the multiple @param chance level of the test
+bool is_multiple(const LevelComparison& levels, double here, double there, double ratio,
+                 double chance) {
+  if (!(here > 0.0)) return false;
+  if (!(there > 0.0)) return true;
+  const double beyond = 2.0 * std::log(here / (ratio * there)) - levels.explained;
+  if (!(levels.variance > 0.0)) return beyond > 0.0;
+  return student_tail(beyond / std::sqrt(levels.variance), levels.freedom) < chance;
+}
+
 /// References and suspect logs may lack opposite laws: the law that is learned from both lies between two different ones, and
 /// equal sizes of what is left are no sign of a common cause.
 /// @return probability by chance of what is seen, small where they are opposite
@@ -172,11 +184,13 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
       find_residual_structure(swapped, d.search.final, options.residual);
   for (std::size_t i = 0; i < left.size(); ++i) {
     const std::size_t channel = left[i].channel;
-    // what would be alike at equal work
-    const double ratio =
-        d.thresholds.least_excess_ratio * std::exp(0.5 * levels_of(d, channel).explained);
+    const LevelComparison levels = levels_of(d, channel);
+    const auto more_than = [&](double there_rms, double here_rms) {
+      return is_multiple(levels, here_rms, there_rms, d.thresholds.least_excess_ratio,
+                         d.thresholds.structure_false_alarm);
+    };
     const bool found = std::any_of(there.begin(), there.end(), [&](const ResidualStructure& r) {
-      return r.channel == channel && ratio * r.rms >= left[i].rms;
+      return r.channel == channel && !more_than(r.rms, left[i].rms);
     });
     const double floor = d.evidence.channels[channel].noise_floor;
     const auto beyond_noise = [&](double rms) {
@@ -186,12 +200,14 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
     const double here =
         std::min(left[i].rms * left[i].rms,
                  beyond_noise(suspect_rms(d.evidence, channel, d.search.final.residual[channel])));
-    const bool room = beyond_noise(reference_rms(d, channel)) * ratio * ratio >= here;
+    const bool room =
+        !more_than(std::sqrt(beyond_noise(reference_rms(d, channel))), std::sqrt(here));
     // one that is weaker than what counts as an oscillation is one all the same
     const bool oscillates =
         left[i].oscillation &&
-        ratio * strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms >=
-            left[i].rms;
+        !more_than(
+            strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms,
+            left[i].rms);
     const double tests = static_cast<double>(left.size());
     if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.opposite_false_alarm)
       out[i] = BesideReferences::kOpposite;

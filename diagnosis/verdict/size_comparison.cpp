@@ -63,24 +63,48 @@ bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   });
 }
 
+namespace {
+
+/// A chi-square value of `freedom` degrees as a normal deviate, zero where it is below its median (Wilson and Hilferty 1931,
+/// Proc. Natl. Acad. Sci. 17, 684).
+double deviate_of_chi_square(double value, double freedom) {
+  const double share = 2.0 / (9.0 * freedom);
+  return std::max(0.0, (std::cbrt(value / freedom) - (1.0 - share)) / std::sqrt(share));
+}
+
+/// Square of a vector over its covariance, whose entries differ by many orders of magnitude. [-]
+double squared_over(const VectorXd& x, const MatrixXd& covariance) {
+  const VectorXd scale = covariance.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const MatrixXd scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const VectorXd z = scale.cwiseProduct(x);
+  return z.dot(least_squares_of_least_norm(scaled, z));
+}
+
+}  // namespace
+
 bool agree(const AppliedEffect& e, const Diagnosis& d, const FoundEffect& f) {
-  if (e.lower95.size() != e.values.size()) return false;
   const std::vector<EffectParameter>& parameters = e.effect->info().parameters;
-  double tests = 0.0, least = 1.0;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
+  const auto count = static_cast<Index>(parameters.size());
+  if (e.covariance.rows() != count || f.covariance.rows() != count) return false;
+  std::vector<Index> compared;
+  VectorXd difference(count);
+  for (Index k = 0; k < count; ++k) {
+    const auto p = static_cast<std::size_t>(k);
+    difference[k] = f.values[p] - e.values[p];
     // Each log prefers a variant of the law as well; what one of them does not have cannot differ.
-    if (parameters[p].choice) continue;
-    if (is_absent(parameters[p], f.values[p]) || is_absent(parameters[p], e.values[p])) continue;
-    /// Half width of a 95 % interval. [standard deviations]
-    constexpr double kNormal95 = 1.959964;  // no threshold: of the normal distribution
-    const double deviation = std::hypot(0.5 * (e.upper95[p] - e.lower95[p]) / kNormal95,
-                                        0.5 * (f.upper95[p] - f.lower95[p]) / kNormal95);
-    const double z = std::abs(f.values[p] - e.values[p]) / std::max(deviation, 1e-300);
-    least = std::min(least, std::erfc(z / std::numbers::sqrt2));
-    tests += 1.0;
+    if (!parameters[p].choice && !is_absent(parameters[p], f.values[p]) &&
+        !is_absent(parameters[p], e.values[p]))
+      compared.push_back(k);
   }
-  tests *= static_cast<double>(d.search.found.size());
-  return tests * least >= d.thresholds.difference_false_alarm || tests == 0.0;
+  if (compared.empty()) return true;
+  const MatrixXd covariance = e.covariance(compared, compared) + f.covariance(compared, compared);
+  const double deviate = deviate_of_chi_square(squared_over(difference(compared), covariance),
+                                               static_cast<double>(compared.size()));
+  const double chance = 0.5 * std::erfc(deviate / std::numbers::sqrt2);
+  if (tracing())
+    fmt::print(stderr, "  {}: values of both logs differ by {:.3g} standard deviations\n",
+               effect_key(e.effect->info(), *d.evidence.series[0].machine, e.at), deviate);
+  return chance * static_cast<double>(d.search.found.size()) >= d.thresholds.difference_false_alarm;
 }
 
 namespace {
@@ -94,13 +118,6 @@ bool agrees_with_references(const Diagnosis& d, const FoundEffect& f) {
   return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
     return same_place(e, f.design.effect) && agree(e, d, f);
   });
-}
-
-/// A chi-square value of `freedom` degrees as a normal deviate, zero where it is below its median (Wilson and Hilferty 1931,
-/// Proc. Natl. Acad. Sci. 17, 684).
-double deviate_of_chi_square(double value, double freedom) {
-  const double share = 2.0 / (9.0 * freedom);
-  return std::max(0.0, (std::cbrt(value / freedom) - (1.0 - share)) / std::sqrt(share));
 }
 
 /// A design that acts in suspect and in reference logs, from the designs for either.
@@ -126,12 +143,9 @@ bool parameters_act(const EffectFit& fit, Index linear, const Significant& signi
   for (Index k = first; k < fit.theta.size(); ++k)
     if (fit.covariance(k, k) > 0.0) moving.push_back(k);
   if (moving.empty()) return true;
-  const MatrixXd covariance = fit.covariance(moving, moving);
-  const VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const MatrixXd scaled = scale.asDiagonal() * covariance * scale.asDiagonal();
-  const VectorXd z = scale.cwiseProduct(VectorXd(fit.theta(moving)));
-  return significant(deviate_of_chi_square(z.dot(least_squares_of_least_norm(scaled, z)),
-                                           static_cast<double>(moving.size())));
+  return significant(
+      deviate_of_chi_square(squared_over(fit.theta(moving), fit.covariance(moving, moving)),
+                            static_cast<double>(moving.size())));
 }
 
 /// The other effects found, each with a size of its own in the references. Where they act there as well and share a channel,

@@ -1,7 +1,7 @@
 // Verdicts of `diagnose` on logs of dynamic plants, whose laws the program does not have: does it name what was changed
 // between reference and suspect log, nothing where nothing was, and nothing untrue beside it? docs/references.md.
-//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--only EFFECT] [--no-reference] [--without-settling] [-v]
-//     [--json FILE] [--logs FOLDER]
+//   plant_verdicts [--plants 20] [--seed 1] [--seconds 200] [--changes 1] [--only EFFECT] [--no-reference]
+//     [--without-settling] [-v] [--json FILE] [--logs FOLDER]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,7 +36,7 @@ using plant::PlantParameters;
 using simulator::Random;
 
 struct Arguments {
-  int plants = 20;
+  int plants = 20, changes = 1;
   std::uint64_t seed = 1;
   double seconds = 200.0;
   std::string only, json, logs;
@@ -113,24 +113,24 @@ std::string log_of(const Machine& machine, const PlantParameters& p,
 
 struct Case {
   std::uint64_t seed = 0;
-  std::string machine, change, at, verdict, answer, left_out;
+  std::string machine, change, verdict, answer, left_out;
+  int hidden = 0, named = 0;  ///< changes, and how many of them are named
   bool right = false;
   double seconds = 0.0;
   ChangeInNoise shows;  ///< how far the hidden change shows at all
   std::vector<SaidEffect> said;
 };
 
-/// Hidden change and place of a case. Index 0 of each plant has none.
+/// Hidden change and its place.
 struct Hidden {
   const Change* change = nullptr;
   std::size_t place = 0;
   std::string at;
+  std::string text() const { return at.empty() ? change->name : change->name + (":" + at); }
 };
 
-Hidden drawn_change(const Machine& machine, const Arguments& a, Random& random) {
-  std::vector<const Change*> possible;
-  for (const Change& c : changes())
-    if (a.only.empty() || a.only == c.name) possible.push_back(&c);
+Hidden drawn_change(const Machine& machine, const std::vector<const Change*>& possible,
+                    Random& random) {
   Hidden h;
   h.change = possible[static_cast<std::size_t>(random.below(static_cast<int>(possible.size())))];
   std::vector<std::size_t> hydraulic;
@@ -147,6 +147,45 @@ Hidden drawn_change(const Machine& machine, const Arguments& a, Random& random) 
   return h;
 }
 
+/// As many changes as asked for, each of another kind.
+std::vector<Hidden> drawn_changes(const Machine& machine, const Arguments& a, Random& random) {
+  std::vector<const Change*> possible;
+  for (const Change& c : changes())
+    if (a.only.empty() || a.only == c.name) possible.push_back(&c);
+  std::vector<Hidden> out;
+  while (std::ssize(out) < a.changes && !possible.empty()) {
+    out.push_back(drawn_change(machine, possible, random));
+    possible.erase(std::find(possible.begin(), possible.end(), out.back().change));
+  }
+  return out;
+}
+
+/// A plant with its changes.
+struct Changed {
+  PlantParameters plant;
+  double told = 1.0;   ///< factor of the payload that its logs tell
+  std::string values;  ///< before and after, for people
+};
+
+Changed with_changes(const PlantParameters& as_built, const std::vector<Hidden>& hidden) {
+  Changed out{as_built, 1.0, ""};
+  for (const Hidden& h : hidden) {
+    if (!out.values.empty()) out.values += ", ";
+    if (*h.change->key == '\0') {
+      out.told = 0.8;
+      out.values += "payload as told, times 0.8";
+      continue;
+    }
+    const plant::ParameterRow& row = *plant::find_parameter(h.change->key);
+    double& value = row.value(out.plant, h.place);
+    const double before = value;
+    value = h.change->factor * value + h.change->plus * row.scale;
+    out.values += fmt::format("{} {:.4g} -> {:.4g} {}", row.key, before / row.scale,
+                              value / row.scale, row.unit);
+  }
+  return out;
+}
+
 /// Whether an effect, given as id:place, is one of these ids at the place of the hidden change.
 bool is_one_of(const std::vector<const char*>& ids, const Hidden& hidden, const std::string& key) {
   return std::any_of(ids.begin(), ids.end(), [&](const char* id) {
@@ -156,30 +195,40 @@ bool is_one_of(const std::vector<const char*>& ids, const Hidden& hidden, const 
   });
 }
 
-void judge(const Diagnosis& d, const Hidden& hidden, Case& c) {
+void judge(const Diagnosis& d, const std::vector<Hidden>& hidden, Case& c) {
   c.verdict = verdict_name(d.verdict);
-  bool truth = false, untrue = false;
-  const auto named = [&](const std::string& key) {
-    return hidden.change != nullptr && is_one_of(hidden.change->named, hidden, key);
+  const auto names = [&](const std::string& key, const Hidden& h) {
+    return is_one_of(h.change->named, h, key);
   };
-  c.said = said_effects(d, named);
-  for (const SaidEffect& s : c.said) truth = truth || s.set_right;
-  if (truth)
-    c.said = said_effects(d, [&](const std::string& key) {
-      return named(key) || is_one_of(hidden.change->beside, hidden, key);
+  c.said = said_effects(d, [&](const std::string& key) {
+    return std::any_of(hidden.begin(), hidden.end(),
+                       [&](const Hidden& h) { return names(key, h); });
+  });
+  std::vector<Hidden> found;
+  for (const Hidden& h : hidden)
+    if (std::any_of(c.said.begin(), c.said.end(),
+                    [&](const SaidEffect& s) { return names(s.key, h); }))
+      found.push_back(h);
+  c.said = said_effects(d, [&](const std::string& key) {
+    return std::any_of(found.begin(), found.end(), [&](const Hidden& h) {
+      return names(key, h) || is_one_of(h.change->beside, h, key);
     });
+  });
+  bool untrue = false;
   for (const SaidEffect& s : c.said) {
     c.answer += s.key + " ";
     untrue = untrue || !s.set_right;
   }
-  c.right = hidden.change != nullptr ? truth && !untrue : d.verdict == Verdict::kNone;
+  c.hidden = static_cast<int>(hidden.size());
+  c.named = static_cast<int>(found.size());
+  c.right = hidden.empty() ? d.verdict == Verdict::kNone : found.size() == hidden.size() && !untrue;
   if (d.verdict == Verdict::kUnknown && d.unexplained) c.answer += "? " + d.unexplained->sentence;
   if (d.verdict == Verdict::kBadData && !d.set_aside.empty())
     c.answer +=
         "bad " + d.set_aside.front().channel + " " + bad_data_word(d.set_aside.front().kind);
 }
 
-/// Two cases of one plant: nothing changed, one change.
+/// Two cases of one plant: nothing changed, and what is hidden.
 std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
   constexpr const char* kMachines[] = {"loader_crane", "three_axis", "excavator", "swing_crane"};
   std::vector<Case> cases;
@@ -189,20 +238,10 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
     const Machine machine =
         load_machine(std::string(SPARFLOW_SOURCE_DIR) + "/problems/machines/" + name + ".yaml");
     const PlantParameters as_built = drawn_plant(machine, random);
-    const Hidden hidden = drawn_change(machine, a, random);
-    PlantParameters changed = as_built;
-    double told = 1.0;
-    std::string values = "payload as told, times 0.8";
-    if (*hidden.change->key == '\0') {
-      told = 0.8;
-    } else {
-      const plant::ParameterRow& row = *plant::find_parameter(hidden.change->key);
-      double& value = row.value(changed, hidden.place);
-      const double before = value;
-      value = hidden.change->factor * value + hidden.change->plus * row.scale;
-      values = fmt::format("{} {:.4g} -> {:.4g} {}", row.key, before / row.scale, value / row.scale,
-                           row.unit);
-    }
+    const std::vector<Hidden> hidden = drawn_changes(machine, a, random);
+    const Changed changed = with_changes(as_built, hidden);
+    std::string label;
+    for (const Hidden& h : hidden) label += (label.empty() ? "" : " + ") + h.text();
     const auto log = [&](const PlantParameters& p, std::uint64_t work, double factor) {
       const std::uint64_t own = 100 * seed + work;
       const std::string text = log_of(machine, p, worked(machine, p, own, a.seconds), own, factor);
@@ -219,20 +258,20 @@ std::vector<Case> plant_cases(std::uint64_t seed, const Arguments& a) {
       Case c;
       c.seed = seed;
       c.machine = name;
-      c.change = clean ? "none" : hidden.change->name;
-      c.at = clean ? "" : hidden.at;
-      const Log suspect = log(clean ? as_built : changed, clean ? 2 : 3, clean ? 1.0 : told);
+      c.change = clean ? "none" : label;
+      const Log suspect =
+          log(clean ? as_built : changed.plant, clean ? 2 : 3, clean ? 1.0 : changed.told);
       DiagnoseOptions options;
       if (a.without_settling) options.evidence.mechanisms.switch_off(Mechanism::kSettling);
       if (a.without_support) options.evidence.mechanisms.switch_off(Mechanism::kCommonSupport);
       const Diagnosis d =
           diagnose(model, {suspect}, a.no_reference ? std::vector<Log>{} : reference, options);
-      judge(d, clean ? Hidden{} : hidden, c);
+      judge(d, clean ? std::vector<Hidden>{} : hidden, c);
       if (!clean)
-        c.shows = change_in_noise(machine, {as_built, changed, told},
-                                  worked(machine, changed, 100 * seed + 3, a.seconds), seed);
+        c.shows = change_in_noise(machine, {as_built, changed.plant, changed.told},
+                                  worked(machine, changed.plant, 100 * seed + 3, a.seconds), seed);
       c.seconds = d.seconds;
-      if (a.verbose && !clean) c.answer += "(" + values + ")";
+      if (a.verbose && !clean) c.answer += "(" + changed.values + ")";
       if (a.verbose) c.answer += "\n" + d.table();
       cases.push_back(std::move(c));
     }
@@ -251,11 +290,12 @@ std::string packed(const std::vector<Case>& cases) {
   Packer p;
   p.number(static_cast<double>(cases.size()));
   for (const Case& c : cases) {
-    const auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, shows,
-                 said] = c;
+    const auto& [seed, machine, change, verdict, answer, left_out, hidden, named, right, seconds,
+                 shows, said] = c;
     p.text(shows.channel).number(shows.ratio);
-    p.number(static_cast<double>(seed)).text(machine).text(change).text(at).text(verdict);
-    p.text(answer).text(left_out).number(right ? 1.0 : 0.0).number(seconds);
+    p.number(static_cast<double>(seed)).text(machine).text(change).text(verdict);
+    p.text(answer).text(left_out).number(hidden).number(named);
+    p.number(right ? 1.0 : 0.0).number(seconds);
     p.number(static_cast<double>(said.size()));
     for (const SaidEffect& s : said) {
       p.text(s.key).number(s.probability).number(s.set_probability);
@@ -269,12 +309,14 @@ std::vector<Case> unpacked_cases(const std::string& bytes) {
   Unpacker u(bytes);
   std::vector<Case> cases(static_cast<std::size_t>(u.number()));
   for (Case& c : cases) {
-    auto& [seed, machine, change, at, verdict, answer, left_out, right, seconds, shows, said] = c;
+    auto& [seed, machine, change, verdict, answer, left_out, hidden, named, right, seconds, shows,
+           said] = c;
     shows.channel = u.text();
     shows.ratio = u.number();
     seed = static_cast<std::uint64_t>(u.number());
-    for (std::string* text : {&machine, &change, &at, &verdict, &answer, &left_out})
-      *text = u.text();
+    for (std::string* text : {&machine, &change, &verdict, &answer, &left_out}) *text = u.text();
+    hidden = static_cast<int>(u.number());
+    named = static_cast<int>(u.number());
     right = u.number() != 0.0;
     seconds = u.number();
     said.resize(static_cast<std::size_t>(u.number()));
@@ -293,6 +335,37 @@ std::string noise_text(const ChangeInNoise& c) {
   return c.channel.empty() ? std::string() : fmt::format("{:.2g} {}", c.ratio, c.channel);
 }
 
+/// Prints and counts the cases with changes, or those without.
+nlohmann::json summary(const std::vector<Case>& all, bool clean) {
+  int right = 0, count = 0, bad = 0, visible = 0, visible_right = 0, hidden = 0, named = 0,
+      untrue = 0;
+  for (const Case& c : all) {
+    if ((c.change == "none") != clean) continue;
+    ++count;
+    right += c.right ? 1 : 0;
+    bad += c.verdict == "bad_data" ? 1 : 0;
+    hidden += c.hidden;
+    named += c.named;
+    untrue += static_cast<int>(std::count_if(c.said.begin(), c.said.end(),
+                                             [](const SaidEffect& s) { return !s.set_right; }));
+    if (c.shows.ratio < kVisible) continue;
+    ++visible;
+    visible_right += c.right ? 1 : 0;
+  }
+  const char* row =
+      clean ? "nothing changed: verdict none" : "changes named, nothing untrue beside them";
+  fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
+  nlohmann::json out = {
+      {"right", right}, {"cases", count}, {"bad_data", bad}, {"untrue_effects", untrue}};
+  if (clean) return out;
+  fmt::print("{:42} {:3} of {:3}\n", "  of these, above a sensor's noise", visible_right, visible);
+  fmt::print("{:42} {:3} of {:3}   untrue effects {}\n", "changes named, each by itself", named,
+             hidden, untrue);
+  out["visible"] = {{"right", visible_right}, {"cases", visible}, {"least_ratio", kVisible}};
+  out["changes"] = {{"named", named}, {"hidden", hidden}};
+  return out;
+}
+
 int run(const Arguments& a, Journal& journal) {
   std::mutex mutex;
   std::vector<Case> all;
@@ -307,34 +380,13 @@ int run(const Arguments& a, Journal& journal) {
         continue;
       }
       fmt::print("{} {:4} {:13} {:32} {:12} {:8} {}\n", c.right ? " " : "X", c.seed, c.machine,
-                 c.at.empty() ? c.change : c.change + ":" + c.at, noise_text(c.shows), c.verdict,
-                 c.answer);
+                 c.change, noise_text(c.shows), c.verdict, c.answer);
       std::fflush(stdout);
       all.push_back(std::move(c));
     }
   });
   nlohmann::json json;
-  for (const bool clean : {false, true}) {
-    int right = 0, count = 0, bad = 0, visible = 0, visible_right = 0;
-    for (const Case& c : all) {
-      if ((c.change == "none") != clean) continue;
-      ++count;
-      right += c.right ? 1 : 0;
-      bad += c.verdict == "bad_data" ? 1 : 0;
-      if (c.shows.ratio < kVisible) continue;
-      ++visible;
-      visible_right += c.right ? 1 : 0;
-    }
-    const char* row =
-        clean ? "nothing changed: verdict none" : "change named, nothing untrue beside it";
-    fmt::print("{:42} {:3} of {:3}   bad data {}\n", row, right, count, bad);
-    if (!clean) {
-      fmt::print("{:42} {:3} of {:3}\n", "  of these, above a sensor's noise", visible_right,
-                 visible);
-      json["visible"] = {{"right", visible_right}, {"cases", visible}, {"least_ratio", kVisible}};
-    }
-    json[clean ? "clean" : "hidden"] = {{"right", right}, {"cases", count}, {"bad_data", bad}};
-  }
+  for (const bool clean : {false, true}) json[clean ? "clean" : "hidden"] = summary(all, clean);
   std::vector<SaidEffect> said;
   for (const Case& c : all) said.insert(said.end(), c.said.begin(), c.said.end());
   if (!said.empty()) fmt::print("{}", reliability_text(said));
@@ -350,7 +402,8 @@ int run_with(int argc, char** argv) {
   app.add("--plants", a.plants, "number of plants");
   app.add("--seed", a.seed, "of the first plant");
   app.add("--seconds", a.seconds, "of each log");
-  app.add("--only", a.only, "one change alone");
+  app.add("--changes", a.changes, "hidden in one log, each of another kind");
+  app.add("--only", a.only, "one kind of change alone");
   app.add("--json", a.json, "file for the counts");
   app.add("--logs", a.logs, "folder for the logs and the learned models");
   app.flag("--no-reference", a.no_reference, "diagnose without the reference log");
@@ -360,6 +413,7 @@ int run_with(int argc, char** argv) {
   app.flag("-v", a.verbose, "whole diagnoses");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
+  if (a.changes < 1) throw UsageError("--changes must be at least 1");
   if (!a.logs.empty() && !std::filesystem::is_directory(a.logs))
     throw UsageError("--logs needs a folder that exists");
   const std::unique_ptr<Journal> journal = app.journal({}, {"--json", "--plants"});

@@ -57,17 +57,20 @@ Diagnosis fitted(Diagnosis d) {
 }
 
 /// Force of the jib in which a law of the boom's position remains: of one sign in the suspect, of another in the reference log.
-Diagnosis with_laws(double suspect, double reference) {
+/// @param spread [-] standard deviation of the logarithm of its size from stretch to stretch
+Diagnosis with_laws(double suspect, double reference, double spread = 0.0) {
   Diagnosis d = with_noise();
   EvidenceChannel& channel = d.evidence.channels[jib_force(d)];
   const std::vector<SignalColumn> signals = channel_signals(d.evidence, channel);
   const auto position = std::find_if(signals.begin(), signals.end(),
                                      [](const SignalColumn& s) { return s.name == "q_boom"; });
   const VectorXd law = (6.0 * position->values.array()).sin() * kNoise;
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> deviate;
   for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
     const Eigen::Index first = channel.blocks[b].first, n = channel.blocks[b].last - first;
-    channel.y.segment(first, n) +=
-        (channel.log[b] == 0 ? suspect : reference) * law.segment(first, n);
+    channel.y.segment(first, n) += (channel.log[b] == 0 ? suspect : reference) *
+                                   std::exp(spread * deviate(random)) * law.segment(first, n);
   }
   return fitted(std::move(d));
 }
@@ -89,8 +92,8 @@ Diagnosis with_loud_stretch(double suspect, double reference, double seconds = 9
   return fitted(std::move(d));
 }
 
-BesideReferences beside(double suspect, double reference) {
-  const Diagnosis d = with_laws(suspect, reference);
+BesideReferences beside(double suspect, double reference, double spread = 0.0) {
+  const Diagnosis d = with_laws(suspect, reference, spread);
   const std::vector<ResidualStructure> left = find_residual_structure(d.evidence, d.search.final);
   EXPECT_EQ(left.size(), 1u);
   return beside_references(d, left, {}).at(0);
@@ -107,6 +110,13 @@ TEST(ResidualLevels, OppositeLawsOfEqualSizeAreAChange) {
 
 TEST(ResidualLevels, ALawOfTheSuspectLogAloneIsAChange) {
   EXPECT_EQ(beside(1.5, 0.0), BesideReferences::kMore);
+}
+
+/// A law of which the suspect log has three times as much: a change where every motion shows it alike, and what motions show
+/// differs by less than that. Where it is another one in each motion, three times is no difference.
+TEST(ResidualLevels, AStructureIsAChangeWhereItExceedsTheReferencesSignificantly) {
+  EXPECT_EQ(beside(9.0, 1.0), BesideReferences::kMore);
+  EXPECT_EQ(beside(5.0, 2.0, 1.0), BesideReferences::kShared);
 }
 
 /// A pump that hunts in one motion, by so much that the RMS of the log is more than twice that of the references; less is none.
