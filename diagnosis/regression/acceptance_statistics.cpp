@@ -5,7 +5,6 @@
 #include <limits>
 
 #include "diagnosis/regression/bounded_estimate.h"
-#include "diagnosis/regression/scatter_of_sizes.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
 
@@ -136,17 +135,23 @@ struct Prediction {
   double product;  ///< of the predicted action with what the stretch shows
 };
 
-/// One-sided chance of gains as large. What the stretches show is a multiple of what is predicted in them: one of an effect that acts as
-/// predicted, and below one half nothing is gained. The multiples scatter as sizes do (scatter_of_sizes.h), so that a single stretch in
-/// which much is predicted does not decide alone where the law has another size in every motion.
+/// One-sided chance of gains as large. What the stretches show is the slope times what is predicted in them: one of an effect that acts
+/// as predicted, and below one half nothing is gained. The slope is a regression through the origin with variances in proportion to the
+/// information of the stretches (Cochran 1977, Sampling Techniques, section 6.7), at least those of the noise.
 double chance_of_gains(const std::vector<Prediction>& stretches) {
-  std::vector<BlockSize> multiples;
+  double squares = 0.0, products = 0.0, scatter = 0.0, count = 0.0;
+  for (const Prediction& p : stretches) {
+    if (!(p.square > 0.0)) continue;
+    squares += p.square;
+    products += p.product;
+    count += 1.0;
+  }
+  if (count < 2.0) return 1.0;
+  const double slope = products / squares;
   for (const Prediction& p : stretches)
-    if (p.square > 0.0) multiples.push_back({p.product / p.square, p.square});
-  if (multiples.size() < 2) return 1.0;
-  const MeanSize mean = mean_size(multiples, variation_of({&multiples}));
-  return student_tail((mean.size - 0.5) / mean.standard_error,
-                      static_cast<double>(multiples.size()) - 1.0);
+    if (p.square > 0.0) scatter += std::pow(p.product - slope * p.square, 2) / p.square;
+  const double variance = std::max(1.0, scatter / (count - 1.0)) / squares;
+  return student_tail((slope - 0.5) / std::sqrt(variance), count - 1.0);
 }
 
 /// A stretch of motion in which an effect acts.

@@ -48,7 +48,7 @@ bool rests_on_bound(const EffectDesign& design, const Eigen::Ref<const Eigen::Ve
 struct HeldOutGain {
   double gain = 0.0, error = 0.0;  ///< [nats] sum over folds and its standard error
   double improved = 0.0;           ///< 0..1 share of folds whose error it reduces
-  /// Chance of gains as large in the stretches of motion in which it acts, if it gained nothing: Student's test on the mean of what they
+  /// Chance of gains as large in the stretches of motion in which it acts, if it gained nothing: Student's test on the slope of what they
   /// show over what the other folds predict, against one half. One where fewer than two are known.
   double chance = 1.0;
 };

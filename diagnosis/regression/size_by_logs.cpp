@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/regression/scatter_of_sizes.h"
 #include "models/math/linear_algebra.h"
 
 namespace sparflow {
@@ -18,9 +17,60 @@ using Eigen::VectorXd;
 /// @threshold [1] 0..1; chosen: far above rounding; standard errors are a thousand times larger there than with a size alone
 constexpr double kIndependent = 1e-6;
 
+/// Size and information in one stretch of motion.
+struct BlockSize {
+  double size, information;
+};
+
+/// Variances of the sizes: factor / information + added.
+struct Variation {
+  double factor = 1.0, added = 0.0;
+  double variance(const BlockSize& b) const { return factor / b.information + added; }
+};
+
+double weighted_mean(const std::vector<BlockSize>& blocks, const Variation& v, double& weights) {
+  double sum = 0.0;
+  weights = 0.0;
+  for (const BlockSize& b : blocks) {
+    const double w = 1.0 / v.variance(b);
+    weights += w;
+    sum += w * b.size;
+  }
+  return weights > 0.0 ? sum / weights : 0.0;
+}
+
+/// Cochran's Q of one group, its degrees of freedom, and the factor of an added variance in its expectation.
+struct Moments {
+  double q = 0.0, freedom = 0.0, factor = 0.0;
+};
+
+void add_moments(const std::vector<BlockSize>& blocks, Moments& m) {
+  if (blocks.size() < 2) return;
+  double weights = 0.0, squares = 0.0;
+  const double mean = weighted_mean(blocks, {}, weights);
+  for (const BlockSize& b : blocks) {
+    squares += b.information * b.information;
+    m.q += b.information * std::pow(b.size - mean, 2);
+  }
+  m.freedom += static_cast<double>(blocks.size() - 1);
+  m.factor += weights - squares / weights;
+}
+
+double log_likelihood(const std::vector<BlockSize>& blocks, const Variation& v) {
+  double weights = 0.0, sum = 0.0;
+  const double mean = weighted_mean(blocks, v, weights);
+  for (const BlockSize& b : blocks)
+    sum -= 0.5 * (std::log(v.variance(b)) + std::pow(b.size - mean, 2) / v.variance(b));
+  return sum;
+}
+
 SizeInLogs size_in_logs(const std::vector<BlockSize>& blocks, const Variation& v) {
-  const MeanSize mean = mean_size(blocks, v);
-  return {mean.size, mean.standard_error, static_cast<int>(blocks.size())};
+  SizeInLogs s;
+  s.blocks = static_cast<int>(blocks.size());
+  double weights = 0.0;
+  s.size = weighted_mean(blocks, v, weights);
+  s.standard_error = weights > 0.0 ? 1.0 / std::sqrt(weights) : 0.0;
+  return s;
 }
 
 }  // namespace
@@ -148,9 +198,18 @@ SizeByLogs size_by_logs(const Evidence& evidence, const ComparedEffect& effect,
   std::vector<BlockSize> suspects, references;
   if (joint.information[0] > 0.0) suspects = block_sizes(evidence, all, joint, 0);
   if (joint.information[1] > 0.0) references = block_sizes(evidence, all, joint, 1);
-  const Variation v = variation_of({&suspects, &references});
+  Moments m;
+  add_moments(suspects, m);
+  add_moments(references, m);
+  Variation scaled, added;
+  if (m.freedom > 0.0) scaled.factor = std::max(1.0, m.q / m.freedom);
+  if (m.factor > 0.0) added.added = std::max(0.0, (m.q - m.freedom) / m.factor);
+  const auto likelihood = [&](const Variation& v) {
+    return log_likelihood(suspects, v) + log_likelihood(references, v);
+  };
+  const Variation v = likelihood(scaled) > likelihood(added) ? scaled : added;
   return {size_in_logs(suspects, v), size_in_logs(references, v), v.factor * joint.covariance,
-          v.freedom, std::sqrt(v.added)};
+          m.freedom, std::sqrt(v.added)};
 }
 
 }  // namespace sparflow

@@ -6,7 +6,10 @@
 
 namespace sparflow {
 
-/// Estimates of one group of logs; how the sizes in its stretches of motion scatter is common to both groups (scatter_of_sizes.h).
+/// Estimates of one group of logs. The sizes in the stretches of motion scatter more than the noise model says, for one of two
+/// reasons, of which the more likely is taken, in common for both groups: the law has another size in every motion (random
+/// effects of DerSimonian and Laird 1986, Control. Clin. Trials 7, 177: a variance is added), or other structure disturbs the
+/// estimates (Birge 1932, Phys. Rev. 40, 207: all variances have a common factor).
 struct SizeInLogs {
   double size = 0.0;  ///< [1] relative to the direction given
   double standard_error = 0.0;
