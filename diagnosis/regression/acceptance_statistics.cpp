@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/regression/bounded_estimate.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
 
@@ -28,6 +27,15 @@ struct Layout {  // of the designs' parameters
     }
   }
 };
+
+/// Solves n x = g with a ridge that only matters where the data do not determine x.
+VectorXd solve(MatrixXd n, const VectorXd& g) {
+  if (g.size() == 0) return g;
+  const VectorXd scale = n.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  n = scale.asDiagonal() * n * scale.asDiagonal();
+  n.diagonal().array() += 1e-9;
+  return scale.cwiseProduct(solve_symmetric(n, scale.cwiseProduct(g)));
+}
 
 double size_where_it_acts(const VectorXd& action) {
   return std::sqrt(action.array().pow(4).sum() / action.squaredNorm());
@@ -227,15 +235,14 @@ HeldOutGain held_out_gain(const Evidence& evidence, const std::vector<const Effe
     if (i < layout.first[index] || i >= layout.first[index] + designs[index]->linear)
       others.push_back(i);
   }
-  const ParameterBounds bounds = bounds_of(designs);
   std::vector<double> gains;
   std::vector<Prediction> by_stretch;
   for (std::size_t f = 0; f < count; ++f) {
     const MatrixXd nf = n_all - data.n[f];
     const VectorXd gf = g_all - data.g[f];
-    const VectorXd with = solve_bounded(nf, gf, bounds);
+    const VectorXd with = solve(nf, gf);
     VectorXd without = VectorXd::Zero(layout.count);
-    without(others) = solve_bounded(nf(others, others), gf(others), bounds.of(others));
+    without(others) = solve(nf(others, others), gf(others));
     // squared error on the fold, up to a constant: theta'N theta - 2 g'theta
     const auto error = [&](const VectorXd& theta) {
       return theta.dot(data.n[f] * theta) - 2.0 * data.g[f].dot(theta);

@@ -5,7 +5,6 @@
 #include <numbers>
 #include <numeric>
 
-#include "diagnosis/regression/bounded_estimate.h"
 #include "models/math/linear_algebra.h"
 
 namespace sparflow {
@@ -14,6 +13,52 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+struct Bounds {
+  VectorXd lower, upper;
+};
+
+Bounds bounds_of(const std::vector<const EffectDesign*>& designs, Index count) {
+  Bounds b{VectorXd(count), VectorXd(count)};
+  Index k = 0;
+  for (const EffectDesign* d : designs) {
+    for (std::size_t i = 0; i < d->lower.size(); ++i) {
+      b.lower[k] = d->lower[i];
+      b.upper[k++] = d->upper[i];
+    }
+  }
+  return b;
+}
+
+/// min 1/2 x'Nx - g'x inside bounds: the unconstrained solution or, outside them, cyclic coordinate descent.
+VectorXd solve_box(const MatrixXd& n, const VectorXd& g, const Bounds& b, bool* at_bound) {
+  const Index m = g.size();
+  // scaled by curvature, because parameters differ by many orders of magnitude
+  VectorXd scale(m);
+  for (Index i = 0; i < m; ++i) scale[i] = n(i, i) > 0.0 ? 1.0 / std::sqrt(n(i, i)) : 0.0;
+  MatrixXd h = scale.asDiagonal() * n * scale.asDiagonal();
+  h.diagonal().array() += 1e-10;
+  const VectorXd gs = scale.cwiseProduct(g);
+  VectorXd x = solve_symmetric(h, gs);
+  const auto lower = [&](Index i) { return scale[i] > 0.0 ? b.lower[i] / scale[i] : 0.0; };
+  const auto upper = [&](Index i) { return scale[i] > 0.0 ? b.upper[i] / scale[i] : 0.0; };
+  *at_bound = false;
+  for (Index i = 0; i < m; ++i) *at_bound = *at_bound || x[i] < lower(i) || x[i] > upper(i);
+  if (*at_bound) {
+    for (Index i = 0; i < m; ++i) x[i] = std::clamp(x[i], lower(i), upper(i));
+    for (int sweep = 0; sweep < 500; ++sweep) {
+      double moved = 0.0;
+      for (Index i = 0; i < m; ++i) {
+        const double next =
+            std::clamp(x[i] + (gs[i] - h.row(i).dot(x)) / h(i, i), lower(i), upper(i));
+        moved = std::max(moved, std::abs(next - x[i]));
+        x[i] = next;
+      }
+      if (moved < 1e-9 * (1.0 + x.norm())) break;
+    }
+  }
+  return scale.cwiseProduct(x);
+}
 
 struct Whitened {
   MatrixXd rows;      // [rows x (parameters + 1)], baseline projected out, unit innovation variance
@@ -259,7 +304,7 @@ MatrixXd ProfileLikelihood::covariance() const {
 
 EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& designs,
                                        const EffectFit* start) {
-  const ParameterBounds bounds = bounds_of(designs);
+  const Bounds bounds = bounds_of(designs, count_);
   fit_.theta = VectorXd::Zero(count_);
   fit_.noise.resize(channels());
   fit_.log_likelihood.assign(channels(), 0.0);
@@ -280,7 +325,7 @@ EffectFit ProfileLikelihood::maximised(const std::vector<const EffectDesign*>& d
   }
   for (int pass = 0; pass < control_.noise_passes + 1; ++pass) {
     set_normal_equations(pass == 0 ? control_.first : nullptr);
-    if (count_ > 0) fit_.theta = solve_bounded(normal_, right_side_, bounds, &fit_.at_bound);
+    if (count_ > 0) fit_.theta = solve_box(normal_, right_side_, bounds, &fit_.at_bound);
     const bool last = pass == control_.noise_passes;
     for (std::size_t c = 0; c < channels(); ++c) {
       if (!active(c)) continue;

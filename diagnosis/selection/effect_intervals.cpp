@@ -111,6 +111,7 @@ Eigen::MatrixXd covariance_of(const Effect& effect, const VectorXd& linear,
   const std::vector<EffectParameter>& parameters = effect.info().parameters;
   const auto n = static_cast<Eigen::Index>(parameters.size());
   std::vector<Eigen::Index> own;
+  own.reserve(parameters.size());
   Eigen::Index l = 0, s = linear.size();
   for (const EffectParameter& p : parameters) own.push_back(p.linear ? l++ : s++);
   Eigen::MatrixXd out = columns(own, own);

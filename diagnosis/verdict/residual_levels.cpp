@@ -205,9 +205,8 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
     // one that is weaker than what counts as an oscillation is one all the same
     const bool oscillates =
         left[i].oscillation &&
-        !more_than(
-            strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms,
-            left[i].rms);
+        !more_than(strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms,
+                   left[i].rms);
     const double tests = static_cast<double>(left.size());
     if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.opposite_false_alarm)
       out[i] = BesideReferences::kOpposite;
