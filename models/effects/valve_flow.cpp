@@ -107,32 +107,17 @@ Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::V
   return fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
 }
 
-SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command) {
-  SectionFit fit = fit_gains(log, cylinder, command);
+SectionFit fit_dead_bands(const MachineSeries& log, int cylinder) {
+  const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+  SectionFit fit = fit_gains(log, cylinder, c.command);
   for (const int side : {1, -1}) {
-    const Samples s = of_side(log, cylinder, command, side);
+    const Samples s = of_side(log, cylinder, c.command, side);
     if (s.command.size() < kFewest) continue;
     const double u0 = best_dead_band(s);
     (side > 0 ? fit.dead_band_extend : fit.dead_band_retract) = u0;
     (side > 0 ? fit.gain_extend : fit.gain_retract) = s.gain(u0);
   }
   return fit;
-}
-
-Eigen::VectorXd late_spool_flow(
-    const MachineSeries& log, int cylinder,
-    const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late) {
-  const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(cylinder)].command;
-  const Eigen::VectorXd spool = late(command);
-  const SectionFit fit = fit_dead_bands(log, cylinder, spool);
-  const auto speed = [&](double u) {
-    return std::copysign(fit.gain(u) * std::max(0.0, std::abs(u) - fit.dead_band(u)), u);
-  };
-  Eigen::VectorXd change(spool.size());
-  for (Eigen::Index k = 0; k < spool.size(); ++k)
-    change[k] = std::isfinite(spool[k] + command[k]) ? speed(spool[k]) - speed(command[k])
-                                                     : spool[k] + command[k];
-  return change;
 }
 
 }  // namespace sparflow

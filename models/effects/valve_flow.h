@@ -29,13 +29,6 @@ Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::V
                           const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late);
 
 /// Fits gains and dead bands: the dead band has the smallest sum of squares, by grid search and golden section.
-/// @param command [samples, -] as for fit_gains
-SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command);
-
-/// What the rod speed changes by when the valve's spool is late: its overlap acts on the late position, so that the flow begins late
-/// by the way through the dead band, and ends early by it. Gains and dead bands are those that fit best behind the late spool.
-/// @param late delays or filters a series  @return [samples, m/s]
-Eigen::VectorXd late_spool_flow(const MachineSeries& log, int cylinder,
-                                const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late);
+SectionFit fit_dead_bands(const MachineSeries& log, int cylinder);
 
 }  // namespace sparflow

@@ -207,11 +207,11 @@ TEST(ReferenceComparison, ALawOfSeveralParametersIsEstimatedFromTheReferencesAlo
     Diagnosis d;
     FoundEffect found;
     found.design.effect = {find_effect("valve_lag"), loader().cylinder_index("boom")};
-    found.design.shape = {at, delay, 0.0};
-    found.values = {1.0, at, delay, 0.0};
-    found.lower95 = {0.9, 0.9 * at, delay, 0.0};
-    found.upper95 = {1.1, 1.1 * at, delay, 0.0};
-    found.covariance = Eigen::Vector4d(0.05 * 0.05, 0.05 * 0.05 * at * at, 0.0, 0.0).asDiagonal();
+    found.design.shape = {at, delay};
+    found.values = {1.0, at, delay};
+    found.lower95 = {0.9, 0.9 * at, delay};
+    found.upper95 = {1.1, 1.1 * at, delay};
+    found.covariance = Eigen::Vector3d(0.05 * 0.05, 0.05 * 0.05 * at * at, 0.0).asDiagonal();
     d.search.found.push_back(found);
     return found_in_references(model, signals, DiagnoseOptions{}, d, 0);
   };

@@ -44,22 +44,10 @@ class ValveLag final : public Effect {
                         {0.0, 0.5, 1.0},
                         true,
                         false,
-                        {"first order", "two stages", "pure delay"}},
-                       {"spool",
-                        "-",
-                        1.0,
-                        0.0,
-                        1.0,
-                        0.0,
-                        "0: the flow is late; 1: the spool is late, and its dead band acts behind",
-                        false,
-                        {0.0, 1.0},
-                        true,
-                        false,
-                        {"flow is late", "spool is late"}}},
+                        {"first order", "two stages", "pure delay"}}},
         .equation =
             "tau dQ/dt + Q = Q_valve(u), or (tau/2 d/dt + 1)^2 Q = Q_valve(u), or Q(t) = "
-            "Q_valve(u(t - tau)); spool: tau dx/dt + x = u (as above), Q = g max(0, |x| - u0)",
+            "Q_valve(u(t - tau))",
         .signals = {"command", "position"},
         .confused_with = {"valve_deadband", "sensor_delay", "compressibility"},
         .separated_by = "repeated steps of the command",
@@ -93,7 +81,7 @@ class ValveLag final : public Effect {
       if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
     };
-    columns = shape[2] < 0.5 ? late_flow(log, at, command, late) : late_spool_flow(log, at, late);
+    columns = late_flow(log, at, command, late);
     return true;
   }
 };

@@ -81,13 +81,11 @@ TEST_F(FlowEffects, LagAndDelayAreDistinguishedAndEstimated) {
     }
   }
   const VectorXd right =
-      scaled_least_squares(gains_and(columns("valve_lag", 0, 0, {tau, 0.0, 0.0}), 0), c.speed);
+      scaled_least_squares(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
   EXPECT_NEAR(right[2], 1.0, 0.01);  // Euler at a thousandth of tau
-  const double exact = residual(gains_and(columns("valve_lag", 0, 0, {tau, 0.0, 0.0}), 0), c.speed);
-  for (const std::vector<double>& wrong : {std::vector<double>{0.16, 0.0, 0.0},
-                                           {0.27, 0.0, 0.0},
-                                           {0.16, 1.0, 0.0},
-                                           {0.21, 1.0, 0.0}}) {
+  const double exact = residual(gains_and(columns("valve_lag", 0, 0, {tau, 0.0}), 0), c.speed);
+  for (const std::vector<double>& wrong :
+       {std::vector<double>{0.16, 0.0}, {0.27, 0.0}, {0.16, 1.0}, {0.21, 1.0}}) {
     EXPECT_LT(3.0 * exact, residual(gains_and(columns("valve_lag", 0, 0, wrong), 0), c.speed));
   }
 }
@@ -114,44 +112,13 @@ TEST_F(FlowEffects, LagActsBehindTheDeadBandOfTheModel) {
   const auto error_and_share = [&](const VectorXd& behind) {
     c.opening = behind;
     MatrixXd x(log.samples(), 3);
-    x << opening.cwiseMax(0.0), opening.cwiseMin(0.0), columns("valve_lag", 0, 0, {tau, 0.0, 0.0});
+    x << opening.cwiseMax(0.0), opening.cwiseMin(0.0), columns("valve_lag", 0, 0, {tau, 0.0});
     return std::pair{residual(x, c.speed), scaled_least_squares(x, c.speed)[2]};
   };
   const auto [exact, share] = error_and_share(opening);
   const auto [of_command, other_share] = error_and_share({});
   EXPECT_NEAR(share, 1.0, 0.01);       // Euler at a thousandth of tau
   EXPECT_LT(3.0 * exact, of_command);  // that lag contains what the dead band removes as well
-}
-
-// A late spool first crosses its overlap: the flow begins later and ends earlier than that of a late opening.
-TEST_F(FlowEffects, ASpoolIsLateBeforeItsDeadBand) {
-  CylinderSeries& c = log.cylinders[0];
-  const double tau = 0.21, extend = 0.1, retract = 0.15;
-  const Valve& valve = *machine.valve_of_cylinder(0);
-  const auto speed_of = [&](double u) {
-    if (u > 0.0)
-      return std::max(0.0, u - extend) * valve.max_flow_extend / machine.cylinders[0].area_piston();
-    return std::min(0.0, u + retract) * valve.max_flow_retract / machine.cylinders[0].area_rod();
-  };
-  VectorXd at_once(log.samples());
-  for (Index k = 0; k < log.samples(); ++k) at_once[k] = speed_of(c.command[k]);
-  for (const auto& [first, last] : log.runs) {
-    double spool = c.command[first];
-    for (Index k = first; k < last; ++k) {
-      for (int i = 0; i < 200 && k > first; ++i)
-        spool += (c.command[k] - spool) / tau * log.step / 200.0;
-      c.speed[k] = speed_of(spool);
-    }
-  }
-  const auto error_and_share = [&](double spool) {
-    MatrixXd x(log.samples(), 2);
-    x << at_once, columns("valve_lag", 0, 0, {tau, 0.0, spool});
-    return std::pair{residual(x, c.speed), scaled_least_squares(x, c.speed)[1]};
-  };
-  const auto [exact, share] = error_and_share(1.0);
-  const auto [of_flow, other_share] = error_and_share(0.0);
-  EXPECT_NEAR(share, 1.0, 0.02);  // Euler at a thousandth of tau, dead bands within 1e-4
-  EXPECT_LT(3.0 * exact, of_flow);
 }
 
 // The pump's pressure is late, so that both valves lose pressure drop; the log's law is an orifice written out by regimes.
