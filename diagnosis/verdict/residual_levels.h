@@ -55,8 +55,8 @@ enum class BesideReferences {
 };
 /// For each structure: shared is one of which the references have as large a one in the same channel by the same residual models, or
 /// leave about as much beyond the sensors' noise there, and the residual of the suspect logs is neither significantly larger
-/// (exceeds_references) nor opposite. No signal of the logs explains an oscillation, whose strength other motions alone change:
-/// that it is less than twice as strong suffices.
+/// (exceeds_references) nor opposite. As large is what is not significantly more than twice theirs at equal work. No signal of the logs
+/// explains an oscillation, whose strength other motions alone change: that it is as large suffices.
 std::vector<BesideReferences> beside_references(const Diagnosis& d,
                                                 const std::vector<ResidualStructure>& left,
                                                 const DiagnoseOptions& options);

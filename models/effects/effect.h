@@ -230,9 +230,8 @@ struct AppliedEffect {
   const Effect* effect = nullptr;
   int at = -1;                 ///< joint, cylinder or pump as info().place says; -1 = machine
   std::vector<double> values;  ///< [SI] by parameter
-  std::vector<double> lower95, upper95;  ///< [SI] intervals; empty = not known
-  Eigen::MatrixXd covariance =
-      {};  ///< [SI] of the values, of which the intervals are the widths; empty = not known
+  std::vector<double> lower95, upper95;           ///< [SI] intervals; empty = not known
+  Eigen::MatrixXd covariance = {};                ///< [SI] of the values; empty = not known
   std::string key(const Machine& machine) const;  ///< "coulomb_friction:boom"
 };
 

@@ -413,7 +413,16 @@ int run_with(int argc, char** argv) {
   app.flag("-v", a.verbose, "whole diagnoses");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
-  if (a.changes < 1) throw UsageError("--changes must be at least 1");
+  const auto kinds = std::count_if(changes().begin(), changes().end(), [&](const Change& c) {
+    return a.only.empty() || a.only == c.name;
+  });
+  if (kinds == 0)
+    throw UsageError(fmt::format("--only {} is no change; the first of {} is {}", a.only,
+                                 changes().size(), changes().front().name));
+  if (a.changes < 1 || a.changes > kinds)
+    throw UsageError(
+        fmt::format("--changes {} is not between 1 and {}, the kinds of change that may be drawn",
+                    a.changes, kinds));
   if (!a.logs.empty() && !std::filesystem::is_directory(a.logs))
     throw UsageError("--logs needs a folder that exists");
   const std::unique_ptr<Journal> journal = app.journal({}, {"--json", "--plants"});
