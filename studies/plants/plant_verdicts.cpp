@@ -413,12 +413,15 @@ int run_with(int argc, char** argv) {
   app.flag("-v", a.verbose, "whole diagnoses");
   app.add_journal();
   if (const auto code = app.parse(argc, argv)) return *code;
-  const auto kinds = std::count_if(changes().begin(), changes().end(), [&](const Change& c) {
-    return a.only.empty() || a.only == c.name;
-  });
+  int kinds = 0;
+  std::string names;
+  for (const Change& c : changes()) {
+    kinds += a.only.empty() || a.only == c.name ? 1 : 0;
+    names += std::string(" ") + c.name;
+  }
   if (kinds == 0)
-    throw UsageError(fmt::format("--only {} is no change; the first of {} is {}", a.only,
-                                 changes().size(), changes().front().name));
+    throw UsageError(
+        fmt::format("--only {} is no change of a plant; expected one of{}", a.only, names));
   if (a.changes < 1 || a.changes > kinds)
     throw UsageError(
         fmt::format("--changes {} is not between 1 and {}, the kinds of change that may be drawn",
