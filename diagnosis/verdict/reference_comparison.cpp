@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/common_law.h"
+#include "diagnosis/verdict/designs_by_group.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "diagnosis/verdict/reference_faults.h"
 #include "diagnosis/verdict/residual_levels.h"
@@ -146,25 +148,49 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
   return change ? compared.in_references : no_change;
 }
 
+/// The law that explains both groups of logs as well as laws of their own, if there is one: the sizes of the law that is best for all
+/// logs together do not differ, and laws of their own are not significantly better.
+std::optional<FoundEffect> explains_both(const Diagnosis& d, std::size_t found,
+                                         const SearchOptions& options) {
+  std::optional<CommonLaw> common = common_law(d, found, options);
+  if (!common || !common->acts_in_references) return {};
+  const auto tests = static_cast<double>(d.search.found.size());
+  if (tests * common->chance < d.thresholds.difference_false_alarm) return {};
+  Diagnosis with = d;
+  with.search.found[found] = common->law;
+  if (!joins_both(by_size(with, found, options).in_references)) return {};
+  return std::move(common->law);
+}
+
+/// Compares sizes, and asks of a difference whether one law explains both groups of logs as well.
+ComparedWithReferences compare(const Diagnosis& d, std::size_t found, const SearchOptions& options,
+                               SizeVerdict& size) {
+  if (tracing()) trace_channels(d, found);
+  size = by_size(d, found, options);
+  ComparedWithReferences compared{size.in_references, {}};
+  if (joins_both(size.in_references)) return compared;
+  compared.law = explains_both(d, found, options);
+  if (compared.law) size.in_references = compared.there = InReferences::kAlike;
+  return compared;
+}
+
 }  // namespace
 
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options) {
-  if (tracing()) trace_channels(d, found);
-  return by_residual(d, found, by_size(d, found, options));
+  SizeVerdict size;
+  compare(d, found, options, size);
+  return by_residual(d, found, size);
 }
 
-std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
-                                            bool last) {
-  std::vector<SizeVerdict> by;
-  for (std::size_t i = 0; i < d.search.found.size(); ++i) {
-    if (tracing()) trace_channels(d, i);
-    by.push_back(by_size(d, i, options));
-  }
+std::vector<ComparedWithReferences> all_in_references(const Diagnosis& d,
+                                                      const SearchOptions& options, bool last) {
+  std::vector<ComparedWithReferences> there;
+  std::vector<SizeVerdict> by(d.search.found.size());
+  for (std::size_t i = 0; i < by.size(); ++i) there.push_back(compare(d, i, options, by[i]));
   const bool joined = std::any_of(by.begin(), by.end(),
                                   [](const SizeVerdict& v) { return joins_both(v.in_references); });
-  std::vector<InReferences> there;
-  for (std::size_t i = 0; i < by.size(); ++i)
-    there.push_back(joined && !last ? by[i].in_references : by_residual(d, i, by[i]));
+  if (joined && !last) return there;
+  for (std::size_t i = 0; i < by.size(); ++i) there[i].there = by_residual(d, i, by[i]);
   return there;
 }
 
@@ -258,15 +284,16 @@ class DifferenceSearch {
   /// Adds what both groups have to what acts in both. @param last whether no further search follows  @return whether there was any
   bool join(const Diagnosis& d, bool last) {
     bool again = false;
-    std::vector<InReferences> all = all_in_references(d, now_.search, last);
-    if (!last && std::none_of(all.begin(), all.end(), joins_both))
+    std::vector<ComparedWithReferences> all = all_in_references(d, now_.search, last);
+    const auto joins = [](const ComparedWithReferences& c) { return joins_both(c.there); };
+    if (!last && std::none_of(all.begin(), all.end(), joins))
       for (std::size_t i = 0; i < all.size(); ++i)
-        if (found_in_references(with_, signals_, alone_, d, i)) all[i] = InReferences::kAlike;
+        if (found_in_references(with_, signals_, alone_, d, i)) all[i].there = InReferences::kAlike;
     for (std::size_t i = 0; i < d.search.found.size(); ++i) {
       const FoundEffect& f = d.search.found[i];
-      if (!joins_both(all[i])) continue;
+      if (!joins(all[i])) continue;
       again = true;
-      if (is_shared(d.evidence, f)) {
+      if (is_shared(d.evidence, f) && !all[i].law) {
         std::erase(now_.candidates, f.design.effect);
         continue;
       }
@@ -274,9 +301,9 @@ class DifferenceSearch {
       const bool had_before =
           std::any_of(now_.evidence.shared.begin(), now_.evidence.shared.end(),
                       [&](const AppliedEffect& e) { return same_place(e, f.design.effect); });
-      add(applied_of(f));
+      add(applied_of(all[i].law ? *all[i].law : f));
       if (had_before) std::erase(now_.candidates, f.design.effect);
-      if (all[i] == InReferences::kAlike) list_as_lacking(d, f.design.effect);
+      if (all[i].there == InReferences::kAlike) list_as_lacking(d, f.design.effect);
     }
     return again;
   }

@@ -1,6 +1,9 @@
 #pragma once
 /// What suspect and reference logs show alike is no change: effects that the model lacks in both, and structure that stays
 /// unexplained in both. Used by diagnose.cpp and its parts only.
+#include <optional>
+#include <vector>
+
 #include "diagnosis/verdict/diagnose.h"
 
 namespace sparflow {
@@ -20,11 +23,17 @@ enum class InReferences {
 /// Other effects found have sizes of their own in the references meanwhile.
 InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOptions& options);
 
+struct ComparedWithReferences {
+  InReferences there = InReferences::kAlike;
+  /// Where one law explains both groups of logs as well as laws of their own: the effect with that law.
+  std::optional<FoundEffect> law;
+};
+
 /// The same for all effects found. Residuals of both groups are comparable only once what both have acts in both, so that
 /// differences of size which the residuals must prove are left as they are while another effect joins the references.
 /// @param last whether no further turn follows
-std::vector<InReferences> all_in_references(const Diagnosis& d, const SearchOptions& options,
-                                            bool last);
+std::vector<ComparedWithReferences> all_in_references(const Diagnosis& d,
+                                                      const SearchOptions& options, bool last);
 
 /// Whether a law of several parameters that the references' own diagnosis has left out, estimated from them alone, has the values
 /// that it has in the suspect logs. The size there of the law with the suspect logs' nonlinear parameters does not tell, because each

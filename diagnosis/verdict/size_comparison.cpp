@@ -9,6 +9,7 @@
 #include "diagnosis/regression/acceptance_statistics.h"
 #include "diagnosis/regression/size_by_logs.h"
 #include "diagnosis/selection/search_state.h"
+#include "diagnosis/verdict/designs_by_group.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
@@ -18,50 +19,6 @@ namespace sparflow {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-bool same_place(const AppliedEffect& a, const EffectAt& b) {
-  return a.effect == b.effect && a.at == b.at;
-}
-
-namespace {
-
-/// Columns of a found effect in other logs than the suspect ones.
-EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, ActingLogs where) {
-  EffectDesign design = found;
-  design.number = 0;
-  for (std::size_t c = 0; c < evidence.channels.size(); ++c)
-    design.columns[c] =
-        found.touches(c)
-            ? evidence.columns(found.effect, found.shape, evidence.channels[c], found.about, where)
-            : Eigen::MatrixXd();
-  // the same law, with the same parameters absent
-  for (Index k = 0; k < found.linear; ++k) {
-    bool absent = true;
-    for (const Eigen::MatrixXd& m : found.columns)
-      absent = absent && (m.cols() == 0 || m.col(k).isZero(0.0));
-    for (Eigen::MatrixXd& m : design.columns)
-      if (absent && m.cols() > 0) m.col(k).setZero();
-  }
-  return design;
-}
-
-/// Whether both have the same nonlinear parameters and therefore proportional columns.
-bool same_shape(const AppliedEffect& a, const FoundEffect& b) {
-  std::vector<double> shape;
-  const std::vector<EffectParameter>& parameters = a.effect->info().parameters;
-  for (std::size_t p = 0; p < parameters.size(); ++p)
-    if (!parameters[p].linear) shape.push_back(a.values[p]);
-  return shape == b.design.shape;
-}
-
-}  // namespace
-
-bool is_shared(const Evidence& evidence, const FoundEffect& f) {
-  const std::vector<AppliedEffect>& all = evidence.options.shared;
-  return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    return same_place(e, f.design.effect) && same_shape(e, f);
-  });
-}
 
 namespace {
 
@@ -120,20 +77,6 @@ bool agrees_with_references(const Diagnosis& d, const FoundEffect& f) {
   });
 }
 
-/// A design that acts in suspect and in reference logs, from the designs for either.
-EffectDesign in_all_logs(const EffectDesign& suspect, const EffectDesign& reference) {
-  EffectDesign all = suspect;
-  all.number = 0;
-  for (std::size_t c = 0; c < all.columns.size(); ++c) {
-    if (!reference.touches(c)) continue;
-    if (suspect.touches(c))
-      all.columns[c] += reference.columns[c];
-    else
-      all.columns[c] = reference.columns[c];
-  }
-  return all;
-}
-
 /// Whether the last `linear` parameters of a fit are not zero: Wald's test with the covariance that is robust against dependence
 /// inside stretches of motion.
 template <class Significant>
@@ -147,27 +90,6 @@ bool parameters_act(const EffectFit& fit, Index linear, const Significant& signi
       deviate_of_chi_square(squared_over(fit.theta(moving), fit.covariance(moving, moving)),
                             static_cast<double>(moving.size())));
 }
-
-/// The other effects found, each with a size of its own in the references. Where they act there as well and share a channel,
-/// an effect would otherwise take their part there and have another size for that reason alone.
-struct OtherEffects {
-  std::vector<EffectDesign> in_references;
-  std::vector<const EffectDesign*> designs;  // in suspect logs, and those above
-
-  OtherEffects(const Diagnosis& d, std::size_t found) {
-    in_references.reserve(d.search.found.size());
-    for (std::size_t i = 0; i < d.search.found.size(); ++i) {
-      if (i == found) continue;
-      const FoundEffect& f = d.search.found[i];
-      designs.push_back(&f.design);
-      if (is_shared(d.evidence, f)) continue;  // acts there already
-      in_references.push_back(design_in(d.evidence, f.design, ActingLogs::kReferences));
-      if (in_references.back().acts()) designs.push_back(&in_references.back());
-    }
-  }
-  OtherEffects(const OtherEffects&) = delete;
-  OtherEffects& operator=(const OtherEffects&) = delete;
-};
 
 void trace_sizes(const Diagnosis& d, const EffectAt& effect, const SizeByLogs& sizes, bool shared) {
   if (!tracing()) return;
@@ -198,33 +120,6 @@ double common_over_change(const Diagnosis& d, const EffectDesign& suspect, const
                               .select(here.cwiseAbs().cwiseMin(there.cwiseAbs()), 0.0)
                               .cwiseProduct(here.cwiseSign());
   return action(d, suspect, common) / action(d, suspect, here - there);
-}
-
-/// Fit of designs beside others, with covariance.
-EffectFit fit_beside(const Evidence& evidence, std::vector<const EffectDesign*> others,
-                     std::initializer_list<const EffectDesign*> more, const EffectFit& start) {
-  others.insert(others.end(), more);
-  FitControl control;
-  control.covariance = true;
-  return fit_effects(evidence, others, &start, control);
-}
-
-/// The evidence in which a law that both logs have is not estimated anew: beside sizes of another variant of it in either group of
-/// logs, which are its part in either, it is not determined.
-Evidence with_law_fixed(const Evidence& evidence, const EffectAt& effect) {
-  Evidence out = evidence;
-  for (EvidenceChannel& channel : out.channels) {
-    const auto own =
-        std::find_if(channel.shared.begin(), channel.shared.end(),
-                     [&](const EvidenceChannel::SharedAction& s) { return s.effect == effect; });
-    if (own == channel.shared.end()) continue;
-    std::vector<Index> others;
-    for (Index k = 0; k < channel.baseline.cols(); ++k)
-      if (k < own->first || k >= own->first + own->columns) others.push_back(k);
-    channel.baseline = channel.baseline(Eigen::all, others).eval();
-    channel.shared.clear();  // their places in the baseline have changed
-  }
-  return out;
 }
 
 /// Linear parameters of an effect in both groups of logs. [SI]
@@ -340,6 +235,8 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
                                                                     : InReferences::kAlike,
             Proof::kClearExcess};
   }
+  // The law that both have, with the size in the search that belongs to no machine, has been its opposite.
+  if (in_suspects.isZero(0.0)) return {InReferences::kVaries, Proof::kClearExcess};
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
     return {InReferences::kVaries, Proof::kClearExcess};

@@ -16,11 +16,6 @@ struct SizeVerdict {
   Proof proof = Proof::kClearExcess;
 };
 
-bool same_place(const AppliedEffect& a, const EffectAt& b);
-
-/// Whether the found effect's columns act in all logs already, so that it is a difference.
-bool is_shared(const Evidence& evidence, const FoundEffect& f);
-
 /// Whether an estimate of a law agrees with a found one: the parameters that both have do not differ significantly, by the level of sizes
 /// that differ and Bonferroni's bound over all effects found. Wald's test (1943, Trans. Am. Math. Soc. 54, 426) of all parameters together:
 /// of a late law the product of share and time is known better than either, so that their single intervals hide a difference.
