@@ -314,7 +314,7 @@ LimitCheck check_duration(const MotionProblem& problem, double duration) {
 
 bool is_end_condition(const LimitCheck& check) {
   const auto named = [&](const char* word) { return check.what.find(word) != std::string::npos; };
-  if (named("start") || named("goal")) return true;
+  if (named("start") || named("goal") || named("jump of")) return true;
   // where a stop has a tolerance, its limit is one like any other
   return check.limit == 0.0 && (named("at the stops") || named("from posture"));
 }
@@ -473,6 +473,29 @@ std::vector<LimitCheck> check_leg(const CraneModel& model, const MotionProblem& 
 }
 
 }  // namespace
+
+std::vector<LimitCheck> check_jumps(const MotionProblem& problem, const Trajectory& motion) {
+  LimitBook book;
+  for (Eigen::Index k = 0; k + 1 < motion.size(); ++k) {
+    const double dt = motion.t[k + 1] - motion.t[k];
+    const Eigen::VectorXd qd = motion.qd.row(k) + dt * motion.qdd.row(k),
+                          q = motion.q.row(k) + 0.5 * dt * (motion.qd.row(k) + qd.transpose());
+    for (int j = 0; j < problem.machine.joint_count(); ++j) {
+      const auto i = static_cast<std::size_t>(j);
+      const Joint& joint = problem.machine.joints[i];
+      const bool turns = joint.type == JointType::kRevolute;
+      const auto see = [&](const char* what, double jump, const Range& r, const char* unit) {
+        book.see(what, joint.name,
+                 {jump, 0.0, jump, std::max(r.hi - r.lo, 1e-12), unit, motion.t[k + 1]});
+      };
+      see("jump of joint ", std::abs(motion.q(k + 1, j) - q[j]), problem.limits.position[i],
+          turns ? "rad" : "m");
+      see("jump of the speed of joint ", std::abs(motion.qd(k + 1, j) - qd[j]),
+          problem.limits.velocity[i], turns ? "rad/s" : "m/s");
+    }
+  }
+  return book.sorted();
+}
 
 double command_effort(const CraneModel& model, const MotionProblem& problem,
                       const Trajectory& motion, int refine) {

@@ -80,8 +80,8 @@ struct LimitCheck {
       0.0;  ///< relative overshoot: (value - limit) / scale of the limit; <= 0 when kept
 };
 
-/// Whether this is a condition that every motion meets at equality (rest, start, goal, stops), so that its being touched is
-/// no news.
+/// Whether this is a condition that every motion meets at equality (rest, start, goal, stops, no jump), so that its being touched
+/// is no news.
 bool is_end_condition(const LimitCheck& check);
 
 /// Worst instant of every limit, most violated first: joint position, velocity and acceleration, valves, pump
@@ -89,6 +89,11 @@ bool is_end_condition(const LimitCheck& check);
 /// @param model without pressure models the pressures are not checked
 std::vector<LimitCheck> check_limits(const CraneModel& model, const MotionProblem& problem,
                                      const Trajectory& motion, int refine = 16);
+
+/// Largest jump of every joint's posture and speed between the end of one interval and the begin of the next, most violated first. The
+/// motions of a solve have none. One that was sampled at other instants than its own jumps where its acceleration has changed in
+/// between, and a jump costs no energy. Of a recording they say only how its speeds were computed.
+std::vector<LimitCheck> check_jumps(const MotionProblem& problem, const Trajectory& motion);
 
 /// Whether a duration [s] is one that the problem allows.
 LimitCheck check_duration(const MotionProblem& problem, double duration);

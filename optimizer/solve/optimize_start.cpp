@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <iterator>
 
 #include "optimizer/phases/tightening.h"
 #include "optimizer/solve/optimize.h"
@@ -233,7 +235,12 @@ class Start {
                       known.qdd.rows() == motion.qdd.rows() && known.qdd == motion.qdd &&
                       known.stops == motion.stops;
     if (!same) {
-      verdict_.checks = check_limits(model_, problem_, motion, options_.refine);
+      std::vector<LimitCheck>& checks = verdict_.checks;
+      checks = check_limits(model_, problem_, motion, options_.refine);
+      const std::ptrdiff_t limits = std::ssize(checks);
+      std::ranges::move(check_jumps(problem_, motion), std::back_inserter(checks));
+      std::ranges::inplace_merge(checks, checks.begin() + limits, std::ranges::greater{},
+                                 &LimitCheck::excess);
       verdict_.energy = exact_total_energy(model_, problem_, motion, options_.refine);
       verdict_.motion = motion;
     }

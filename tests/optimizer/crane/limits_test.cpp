@@ -86,6 +86,25 @@ TEST(Limits, AreCheckedBetweenTheKnots) {
   EXPECT_LT(s.check(m, "position of joint x", 1).excess, 0.0);
 }
 
+/// Sampled at 0, 1.5 and 2 s, the hop of two seconds accelerates evenly until 1.5 s: to 0.375 of its way in place of 0.875.
+TEST(Limits, AMotionSampledAtOtherInstantsThanItsOwnJumps) {
+  Slide s;
+  Trajectory hop = s.hop(0.5, 0.4);
+  for (const LimitCheck& c : check_jumps(s.problem, hop)) EXPECT_NEAR(c.value, 0.0, 1e-12);
+  const std::vector<LimitCheck> jumps =
+      check_jumps(s.problem, resampled(hop, Eigen::Vector3d(0.0, 1.5, 2.0)));
+  ASSERT_EQ(jumps.size(), 2U);
+  EXPECT_EQ(jumps[0].what, "jump of joint x");
+  EXPECT_NEAR(jumps[0].value, 0.5 * 0.4, 1e-12);
+  EXPECT_NEAR(jumps[0].time, 1.5, 1e-12);
+  EXPECT_NEAR(jumps[0].excess, 0.2 / 2.0, 1e-12);
+  EXPECT_TRUE(is_end_condition(jumps[0])) << "that a motion has no jump is no news";
+  hop.qd(2, 0) += 0.1;
+  const std::vector<LimitCheck> faster = check_jumps(s.problem, hop);
+  EXPECT_EQ(faster[0].what, "jump of the speed of joint x");
+  EXPECT_NEAR(faster[0].value, 0.1, 1e-12);
+}
+
 TEST(Limits, EachDirectionHasItsOwnValveLimit) {
   Slide s;
   const double piston = s.problem.machine.cylinders[0].area_piston();
