@@ -199,9 +199,8 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
   const EffectFit apart = both ? fit({&suspect, &reference}) : fit({&suspect});
   const Index first = apart.theta.size() - (both ? 2 : 1) * suspect.linear;
   const VectorXd in_suspects = apart.theta.segment(first, suspect.linear);
-  const VectorXd nothing = VectorXd::Zero(suspect.linear);
-  const SizeByLogs sizes =
-      size_by_logs(evidence, {suspect, reference, nothing, in_suspects, others}, apart);
+  const SizeByLogs sizes = size_by_logs(
+      evidence, {suspect, reference, VectorXd::Zero(suspect.linear), in_suspects, others}, apart);
   // two-sided, Bonferroni's bound over the effects found; the sizes' scatter is estimated from as many stretches of motion as there
   // are, so that Student's distribution replaces the normal one (Hartung and Knapp 2001, Statist. Med. 20, 3875)
   const double freedom = sizes.freedom;
@@ -235,7 +234,7 @@ SizeVerdict by_size(const Diagnosis& d, std::size_t found, const SearchOptions& 
                                                                     : InReferences::kAlike,
             Proof::kClearExcess};
   }
-  // The law that both have, with the size in the search that belongs to no machine, has been its opposite.
+  // The law that both have had been estimated as its own opposite, which this one undid.
   if (in_suspects.isZero(0.0)) return {InReferences::kVaries, Proof::kClearExcess};
   // of a single stretch of motion it is not known how far the size varies between motions
   if (here.blocks > 0 && (sizes.freedom == 0.0 || !significant(here.size / here.standard_error)))
