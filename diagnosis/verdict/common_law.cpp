@@ -65,6 +65,7 @@ double chance_of_excess(const std::vector<double>& first, const std::vector<doub
 EffectDesign best_in_all_logs(const Diagnosis& d, const EffectDesign& found, const Designs& others,
                               const SearchOptions& options) {
   std::vector<SearchCandidate> candidates = search_candidates(d.evidence, {found.effect});
+  if (candidates.empty()) candidates.push_back({found.effect, {}});
   candidates.front().designs.push_back(found);
   for (EffectDesign& design : candidates.front().designs)
     design = in_all_logs(design, design_in(d.evidence, design, ActingLogs::kReferences));
