@@ -6,19 +6,12 @@
 
 namespace sparflow {
 
-/// The law of a found effect whose nonlinear parameters, and variant, explain all logs best with one size in all of them.
-struct CommonLaw {
-  FoundEffect law;  ///< the found effect with this law's signature in the suspect logs
-  bool acts_in_references = false;
-  /// 0..1 Probability that laws of their own, the found one in the suspect logs and the same with another size in the references, explain
-  /// the stretches of motion better by chance (Vuong 1989, Econometrica 57, 307, with stretches in place of rows).
-  double chance = 1.0;
-};
-
-/// A search takes the nonlinear parameters that explain the suspect logs best. The references, with other motions, then show another size of
-/// this law for that reason alone: a dead band that vanishes at full opening looks like one that does not in a log of small openings.
-/// @param found index into the effects found  @return nothing for an effect without nonlinear parameters
-std::optional<CommonLaw> common_law(const Diagnosis& d, std::size_t found,
-                                    const SearchOptions& options);
+/// The found effect with the nonlinear parameters, and the variant of its law, that explain all logs best with one size in all of them.
+/// A search takes those that explain the suspect logs best. The references, with other motions, then show another size of this law for that
+/// reason alone: a limit of the pump that is a little too low is broken in references that hardly reach it.
+/// @param found index into the effects found
+/// @return nothing for an effect without nonlinear parameters, and where that law does not act in the references, which tell nothing of it then
+std::optional<FoundEffect> common_law(const Diagnosis& d, std::size_t found,
+                                      const SearchOptions& options);
 
 }  // namespace sparflow

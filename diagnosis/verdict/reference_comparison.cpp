@@ -148,21 +148,18 @@ InReferences by_residual(const Diagnosis& d, std::size_t found, const SizeVerdic
   return change ? compared.in_references : no_change;
 }
 
-/// The law that explains both groups of logs as well as laws of their own, if there is one: the sizes of the law that is best for all
-/// logs together do not differ, and laws of their own are not significantly better.
+/// The one law that explains both groups of logs, if there is one: its sizes do not differ.
 std::optional<FoundEffect> explains_both(const Diagnosis& d, std::size_t found,
                                          const SearchOptions& options) {
-  std::optional<CommonLaw> common = common_law(d, found, options);
-  if (!common || !common->acts_in_references) return {};
-  const auto tests = static_cast<double>(d.search.found.size());
-  if (tests * common->chance < d.thresholds.difference_false_alarm) return {};
+  std::optional<FoundEffect> law = common_law(d, found, options);
+  if (!law) return {};
   Diagnosis with = d;
-  with.search.found[found] = common->law;
+  with.search.found[found] = *law;
   if (!joins_both(by_size(with, found, options).in_references)) return {};
-  return std::move(common->law);
+  return law;
 }
 
-/// Compares sizes, and asks of a difference whether one law explains both groups of logs as well.
+/// Compares sizes, and asks of a difference whether one law explains both groups of logs.
 ComparedWithReferences compare(const Diagnosis& d, std::size_t found, const SearchOptions& options,
                                SizeVerdict& size) {
   if (tracing()) trace_channels(d, found);

@@ -25,7 +25,7 @@ InReferences in_references(const Diagnosis& d, std::size_t found, const SearchOp
 
 struct ComparedWithReferences {
   InReferences there = InReferences::kAlike;
-  /// Where one law explains both groups of logs as well as laws of their own: the effect with that law.
+  /// Where one law explains both groups of logs: the effect with that law.
   std::optional<FoundEffect> law;
 };
 
