@@ -314,7 +314,7 @@ LimitCheck check_duration(const MotionProblem& problem, double duration) {
 
 bool is_end_condition(const LimitCheck& check) {
   const auto named = [&](const char* word) { return check.what.find(word) != std::string::npos; };
-  if (named("start") || named("goal") || named("jump of")) return true;
+  if (named("start") || named("goal")) return true;
   // where a stop has a tolerance, its limit is one like any other
   return check.limit == 0.0 && (named("at the stops") || named("from posture"));
 }

@@ -80,8 +80,8 @@ struct LimitCheck {
       0.0;  ///< relative overshoot: (value - limit) / scale of the limit; <= 0 when kept
 };
 
-/// Whether this is a condition that every motion meets at equality (rest, start, goal, stops, no jump), so that its being touched
-/// is no news.
+/// Whether this is a condition that every motion meets at equality (rest, start, goal, stops), so that its being touched is
+/// no news.
 bool is_end_condition(const LimitCheck& check);
 
 /// Worst instant of every limit, most violated first: joint position, velocity and acceleration, valves, pump

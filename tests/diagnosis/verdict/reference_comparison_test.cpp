@@ -221,35 +221,49 @@ TEST(ReferenceComparison, ALawOfSeveralParametersIsEstimatedFromTheReferencesAlo
   EXPECT_FALSE(found_with(1.05 * tau, 0.0, logs.reference)) << "not in the references";
 }
 
-/// Both logs have a dead band, and the change is best told by its other variant. In either group of logs the size of that variant is
-/// compared while the law that both have keeps its values: estimated anew, it would be the sum of both sizes, and neither is determined.
-TEST(ReferenceComparison, AnotherVariantOfALawThatBothLogsHaveIsCompared) {
-  const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
-  const CraneModel model = CraneModel::untrained(loader());
-  const EffectAt band{find_effect("valve_deadband"), loader().cylinder_index("boom")};
-  for (const bool changed : {true, false}) {
+/// Evidence of both logs, which have a dead band of the boom's valve whose gain stays, and the variant that vanishes at full opening as
+/// an effect found.
+struct TwoVariants {
+  EffectAt band{find_effect("valve_deadband"), loader().cylinder_index("boom")};
+  Diagnosis d;
+  std::size_t at = 0;  ///< of the speed's channel
+
+  explicit TwoVariants(const testing_support::HiddenCase& logs) {
     EvidenceOptions options;
     options.shared = {{band.effect, band.at, {0.05, 0.05, 0.0}, {}, {}}};
-    Diagnosis d;
-    d.evidence = collect_evidence(model, {make_signals(loader(), logs.train)},
-                                  {make_signals(loader(), logs.reference)}, nullptr, options);
-    const auto at = d.evidence.find(EvidenceKind::kFlow, band.at) - d.evidence.channels.data();
-    EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
+    d.evidence =
+        collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
+                         {make_signals(loader(), logs.reference)}, nullptr, options);
+    at = static_cast<std::size_t>(d.evidence.find(EvidenceKind::kFlow, band.at) -
+                                  d.evidence.channels.data());
     FoundEffect found;
     found.design = make_design(d.evidence, band, {1.0});
     found.held_out_chance = 0.0;
+    d.search.found.push_back(std::move(found));
+  }
+  Eigen::VectorXd shown(double variant, double size, ActingLogs where) const {
+    return d.evidence.columns(band, std::vector{variant}, d.evidence.channels[at], {}, where) *
+           Eigen::Vector2d(size, size);
+  }
+  void fit_to(const Eigen::VectorXd& speed) {
+    EvidenceChannel& channel = d.evidence.channels[at];
     std::mt19937_64 random(2);
     NoiseModel noise;
     noise.variance = 1e-3 * 1e-3;  // [m^2/s^2]
-    channel.y = testing_support::draw(noise, channel.blocks, random) +
-                d.evidence.columns(band, std::vector{1.0}, channel, {},
-                                   changed ? ActingLogs::kSuspects : ActingLogs::kAll) *
-                    Eigen::Vector2d(0.04, 0.04);
-    d.search.found.push_back(std::move(found));
+    channel.y = testing_support::draw(noise, channel.blocks, random) + speed;
     FitControl control;
     control.keep_residuals = true;
     d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
-    EXPECT_EQ(in_references(d, 0, {}), changed ? InReferences::kNot : InReferences::kAlike);
+  }
+};
+
+/// Both logs have a dead band, and the change is best told by its other variant. In either group of logs the size of that variant is
+/// compared while the law that both have keeps its values: estimated anew, it would be the sum of both sizes, and neither is determined.
+TEST(ReferenceComparison, AnotherVariantOfALawThatBothLogsHaveIsCompared) {
+  TwoVariants bands(testing_support::hidden_case(loader(), {}, {5, 90.0}));
+  for (const bool changed : {true, false}) {
+    bands.fit_to(bands.shown(1.0, 0.04, changed ? ActingLogs::kSuspects : ActingLogs::kAll));
+    EXPECT_EQ(in_references(bands.d, 0, {}), changed ? InReferences::kNot : InReferences::kAlike);
   }
 }
 
@@ -307,31 +321,11 @@ TEST(ReferenceComparison, WhatUndoesTheOppositeOfALawIsNoChange) {
     Eigen::VectorXd& command = testing_support::channel(*log, "u_boom").values;
     command *= largest / command.cwiseAbs().maxCoeff();  // the variants differ by the opening
   }
-  const EffectAt band{find_effect("valve_deadband"), loader().cylinder_index("boom")};
-  EvidenceOptions options;
-  options.shared = {{band.effect, band.at, {0.05, 0.05, 0.0}, {}, {}}};
-  Diagnosis d;
-  d.evidence =
-      collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
-                       {make_signals(loader(), logs.reference)}, nullptr, options);
-  const auto at = d.evidence.find(EvidenceKind::kFlow, band.at) - d.evidence.channels.data();
-  EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
-  FoundEffect found;
-  found.design = make_design(d.evidence, band, {1.0});
-  found.held_out_chance = 0.0;
-  std::mt19937_64 random(2);
-  NoiseModel noise;
-  noise.variance = 1e-3 * 1e-3;  // [m^2/s^2]
-  const Eigen::Vector2d size(0.05, 0.05);
-  channel.y = testing_support::draw(noise, channel.blocks, random) +
-              found.design.columns[static_cast<std::size_t>(at)] * size -
-              d.evidence.columns(band, std::vector{0.0}, channel, {}, ActingLogs::kAll) * size;
-  d.search.found.push_back(std::move(found));
-  FitControl control;
-  control.keep_residuals = true;
-  d.search.final = fit_effects(d.evidence, {&d.search.found[0].design}, nullptr, control);
-  EXPECT_GT(d.search.final.theta.minCoeff(), 0.03) << "found beside the opposite";
-  EXPECT_EQ(in_references(d, 0, {}), InReferences::kVaries);
+  TwoVariants bands(logs);
+  bands.fit_to(bands.shown(1.0, 0.05, ActingLogs::kSuspects) -
+               bands.shown(0.0, 0.05, ActingLogs::kAll));
+  EXPECT_GT(bands.d.search.final.theta.minCoeff(), 0.03) << "found beside the opposite";
+  EXPECT_EQ(in_references(bands.d, 0, {}), InReferences::kVaries);
 }
 
 /// A friction of the jib in white noise, of one size in the suspect and of another in the reference log.
