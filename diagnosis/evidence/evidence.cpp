@@ -5,6 +5,7 @@
 
 #include "identification/signals/low_pass.h"
 #include "identification/signals/series.h"
+#include "models/effects/valve_flow.h"
 
 namespace sparflow {
 
@@ -76,6 +77,22 @@ bool is_replaced_when_changed(const Effect& effect) {
                      [](const EffectParameter& p) { return p.linear && p.lower > 0.0; });
 }
 
+SectionPool Evidence::sections(const EffectAt& effect, std::span<const double> shape,
+                               const EvidenceChannel& channel,
+                               std::span<const double> about) const {
+  SectionPool pool;
+  for (std::size_t log = 0; log < series.size() && series.size() > 1; ++log) {
+    pool.begin(log);
+    Eigen::MatrixXd ignored;
+    if (effect.effect->columns(series[log], {channel.kind, channel.index, about, &pool}, effect.at,
+                               shape, ignored) &&
+        pool.empty())
+      break;  // the effect fits no section
+  }
+  pool.complete();
+  return pool;
+}
+
 Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double> shape,
                                   const EvidenceChannel& channel, std::span<const double> about,
                                   ActingLogs where) const {
@@ -86,13 +103,16 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
   const std::vector<EvidenceKind> kinds = effect.effect->shows_in();
   if (std::find(kinds.begin(), kinds.end(), channel.kind) == kinds.end()) return {};
   Eigen::MatrixXd result;
+  SectionPool pool = sections(effect, shape, channel, about);
   for (std::size_t log = first_log; log < last_log; ++log) {
     Eigen::MatrixXd raw;
+    pool.begin(log);
     const Eigen::MatrixXd inertial =
         inertial_columns(*effect.effect, series[log], {channel.kind, channel.index}, effect.at);
     bool through_flow = false;  // over the return edge
-    if (!effect.effect->columns(series[log], {channel.kind, channel.index, about}, effect.at, shape,
-                                raw)) {
+    if (!effect.effect->columns(
+            series[log], {channel.kind, channel.index, about, pool.empty() ? nullptr : &pool},
+            effect.at, shape, raw)) {
       through_flow = channel.flow_slope.size() > 0 && channel.index == effect.at &&
                      effect.effect->return_edge_flow(series[log], effect.at, shape, raw);
       if (!through_flow) raw.resize(0, 0);
@@ -153,8 +173,12 @@ void Evidence::subtract_shared(std::size_t log, const EffectAt& effect,
       if (!parameters[p].linear) before.push_back(known.values[p]);
     Eigen::MatrixXd there;
     const bool other = !std::equal(before.begin(), before.end(), shape.begin(), shape.end());
-    if (is_replaced_when_changed(*known.effect) && other &&
-        known.effect->columns(series[log], {channel.kind, channel.index}, known.at, before, there))
+    if (!is_replaced_when_changed(*known.effect) || !other) return;
+    SectionPool pool = sections({known.effect, known.at}, before, channel, {});
+    pool.begin(log);
+    if (known.effect->columns(series[log],
+                              {channel.kind, channel.index, {}, pool.empty() ? nullptr : &pool},
+                              known.at, before, there))
       columns -= there;
     return;
   }

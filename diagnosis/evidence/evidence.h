@@ -118,6 +118,9 @@ struct Evidence {
   Eigen::VectorXd known(std::size_t log, EvidenceKind kind, int index) const;
   /// The same behind the channel's filter. What comes from filtered derivatives has passed it (Effect::columns_filtered).
   Eigen::VectorXd smooth_known(std::size_t log, EvidenceKind kind, int index) const;
+  /// Valve sections as an effect's columns of a channel fit them, those of all logs together; empty where they fit none.
+  SectionPool sections(const EffectAt& effect, std::span<const double> shape,
+                       const EvidenceChannel& channel, std::span<const double> about) const;
   /// A change of an effect that acts in all logs and has a parameter which switches it on (a lag's share) replaces the law of
   /// before: its signature is the difference of both.
   /// @param columns [samples x linear parameters] of the effect with its present shape, changed in place

@@ -123,14 +123,10 @@ struct VerdictOptions {
   /// @threshold [1] 0..1; derived: more probable than chance and all rivals together.
   double least_probability = 0.5;
   /// Probability, over all channels together, with which equal residuals are taken for larger ones in the suspect logs
-  /// than in the references (Welch's test on the levels of blocks, Bonferroni's bound over the channels). What is not
-  /// larger is no change.
+  /// than in the references (Welch's test on the levels of blocks, Bonferroni's bound over the channels), and, over all
+  /// structures, unrelated ones for opposite ones (Student's test on the suspect logs' blocks). What is neither is no change.
   /// @threshold [1] 0..1; chosen: one log in a hundred
   double structure_false_alarm = 0.01;
-  /// Probability, over all structures together, with which unrelated structures are taken for opposite ones (Student's test on
-  /// the blocks of the suspect logs). A common cause has the same sign, so that chance hardly ever makes it an opposite one.
-  /// @threshold [1] 0..1; chosen: one log in twenty that has structures of equal size and another cause
-  double opposite_false_alarm = 0.05;
   /// RMS of a channel's residual over that in the references, above which it is a difference although no effect and no signal
   /// explains it, of a structure in it over that of one in the references or over what they leave there beyond the sensors' noise,
   /// below which it may be shared, and of what an effect leaves over what the references leave, above which it may be a minor one.

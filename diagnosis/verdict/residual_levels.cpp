@@ -208,7 +208,7 @@ std::vector<BesideReferences> beside_references(const Diagnosis& d,
         !more_than(strongest_oscillation(swapped, swapped.channels[channel], options.residual).rms,
                    left[i].rms);
     const double tests = static_cast<double>(left.size());
-    if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.opposite_false_alarm)
+    if (tests * chance_of_opposite_law(d, left[i], options) < d.thresholds.structure_false_alarm)
       out[i] = BesideReferences::kOpposite;
     else if ((found || room || oscillates) &&
              (left[i].oscillation || !exceeds_references(d, channel)))

@@ -90,12 +90,16 @@ struct Instant {
   std::vector<int> leader;
 };
 
+class SectionPool;  // valve_flow.h
+
 /// One measured quantity of a log: what `kind` says of cylinder or pump `index`.
 struct MeasuredQuantity {
   EvidenceKind kind;
   int index;  ///< cylinder, or pump where the kind is one of the pump
   /// Linear parameters [SI] at which a signature holds that is not proportional to them; empty: at typical values.
   std::span<const double> about = {};
+  /// Gathers the valve sections of several logs, which then have the same gains in all of them; null: of each log by itself.
+  SectionPool* sections = nullptr;
 };
 
 class Effect {

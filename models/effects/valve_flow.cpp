@@ -24,23 +24,21 @@ double file_gain(const Machine& machine, int cylinder, int side) {
   return (side > 0 ? valve->max_flow_extend : valve->max_flow_retract) / area;
 }
 
-/// |u| [-] and the rod speed in the commanded direction [m/s], for one direction.
-struct Samples {
-  std::vector<double> command, speed;
-  /// Least-squares gain [m/s] beyond a dead band. @param cost sum of squares
-  double gain(double dead_band, double* cost = nullptr) const {
-    double uu = 0.0, uv = 0.0, vv = 0.0;
-    for (std::size_t k = 0; k < command.size(); ++k) {
-      const double u = std::max(0.0, command[k] - dead_band);
-      uu += u * u;
-      uv += u * speed[k];
-      vv += speed[k] * speed[k];
-    }
-    const double g = uu > 0.0 ? uv / uu : 0.0;
-    if (cost != nullptr) *cost = vv - g * uv;
-    return g;
+using Samples = SectionPool::Samples;
+
+/// Least-squares gain [m/s] beyond a dead band. @param cost sum of squares
+double gain_of(const Samples& s, double dead_band, double* cost = nullptr) {
+  double uu = 0.0, uv = 0.0, vv = 0.0;
+  for (std::size_t k = 0; k < s.command.size(); ++k) {
+    const double u = std::max(0.0, s.command[k] - dead_band);
+    uu += u * u;
+    uv += u * s.speed[k];
+    vv += s.speed[k] * s.speed[k];
   }
-};
+  const double g = uu > 0.0 ? uv / uu : 0.0;
+  if (cost != nullptr) *cost = vv - g * uv;
+  return g;
+}
 
 Samples of_side(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command, int side) {
   const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
@@ -60,7 +58,7 @@ Samples of_side(const MachineSeries& log, int cylinder, const Eigen::VectorXd& c
 double best_dead_band(const Samples& s) {
   const auto cost = [&](double u0) {
     double c = 0.0;
-    s.gain(u0, &c);
+    gain_of(s, u0, &c);
     return c;
   };
   // A dead band near the largest command would leave nothing to fit.
@@ -89,33 +87,50 @@ double best_dead_band(const Samples& s) {
 
 }  // namespace
 
-SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command) {
+SectionPool::Samples SectionPool::together(int cylinder, int side, Samples samples) {
+  if (!complete_) return samples_[{cylinder, side, log_}] = std::move(samples);
+  Samples all;
+  for (const auto& [place, kept] : samples_) {
+    if (std::get<0>(place) != cylinder || std::get<1>(place) != side) continue;
+    const bool present = std::get<2>(place) == log_;
+    const Samples& s = present ? samples : kept;
+    all.command.insert(all.command.end(), s.command.begin(), s.command.end());
+    all.speed.insert(all.speed.end(), s.speed.begin(), s.speed.end());
+  }
+  return all;
+}
+
+SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command,
+                     SectionPool* pool) {
   SectionFit fit;
   for (const int side : {1, -1}) {
-    const Samples s = of_side(log, cylinder, command, side);
+    Samples s = of_side(log, cylinder, command, side);
+    if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
     (side > 0 ? fit.gain_extend : fit.gain_retract) =
-        s.command.size() < kFewest ? file_gain(*log.machine, cylinder, side) : s.gain(0.0);
+        s.command.size() < kFewest ? file_gain(*log.machine, cylinder, side) : gain_of(s, 0.0);
   }
   return fit;
 }
 
 Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::VectorXd& opening,
-                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late) {
+                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late,
+                          SectionPool* pool) {
   const Eigen::VectorXd extend = opening.cwiseMax(0.0), retract = opening.cwiseMin(0.0);
   const Eigen::VectorXd late_extend = late(extend), late_retract = late(retract);
-  const SectionFit fit = fit_gains(log, cylinder, late_extend + late_retract);
+  const SectionFit fit = fit_gains(log, cylinder, late_extend + late_retract, pool);
   return fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
 }
 
-SectionFit fit_dead_bands(const MachineSeries& log, int cylinder) {
+SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, SectionPool* pool) {
   const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
-  SectionFit fit = fit_gains(log, cylinder, c.command);
+  SectionFit fit = fit_gains(log, cylinder, c.command, pool);
   for (const int side : {1, -1}) {
-    const Samples s = of_side(log, cylinder, c.command, side);
+    Samples s = of_side(log, cylinder, c.command, side);
+    if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
     if (s.command.size() < kFewest) continue;
     const double u0 = best_dead_band(s);
     (side > 0 ? fit.dead_band_extend : fit.dead_band_retract) = u0;
-    (side > 0 ? fit.gain_extend : fit.gain_retract) = s.gain(u0);
+    (side > 0 ? fit.gain_extend : fit.gain_retract) = gain_of(s, u0);
   }
   return fit;
 }

@@ -1,7 +1,11 @@
 #pragma once
 /// Fit of a valve section to a log: rod speed against command by ordinary least squares. It scales the columns of the
 /// flow effects, so that their parameters are dimensionless or times.
+#include <cstddef>
 #include <functional>
+#include <map>
+#include <tuple>
+#include <vector>
 
 #include "models/effects/series.h"
 
@@ -17,18 +21,43 @@ struct SectionFit {
   }
 };
 
+/// The valve sections of several logs. A valve has one gain whatever the log; fitted to each log by itself it takes up what else slows
+/// the rods there (a pump without flow left), and the sizes of an effect, whose columns it scales, would differ from log to log.
+/// Columns are computed for each log twice: the first time the fits keep their samples here, the second time they use those of all logs.
+class SectionPool {
+ public:
+  /// |u| [-] and the rod speed in the commanded direction [m/s], for one direction.
+  struct Samples {
+    std::vector<double> command, speed;
+  };
+  void begin(std::size_t log) { log_ = log; }
+  void complete() { complete_ = true; }
+  /// No effect fits a section of these.
+  bool empty() const { return samples_.empty(); }
+  /// Keeps the samples of the present log in place of former ones, or, once complete, returns those of all logs.
+  Samples together(int cylinder, int side, Samples samples);
+
+ private:
+  std::map<std::tuple<int, int, std::size_t>, Samples> samples_;  // by cylinder, side, log
+  std::size_t log_ = 0;
+  bool complete_ = false;
+};
+
 /// Fits the gains alone: least squares of the measured speed on `command`, for each sign. A direction with too few
 /// samples gets the gain of the machine file's full flow, 0 if it has none.
 /// @param command [samples, -] the logged command, or the delayed one where the flow follows that
-SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command);
+/// @param pool of several logs; null: of this one alone
+SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command,
+                     SectionPool* pool = nullptr);
 
 /// What the rod speed changes by when the valve's opening acts late. The gains are those of the late opening; those of the opening
 /// itself would be biased towards zero.
 /// @param opening [samples, -]  @param late delays or filters a series  @return [samples, m/s]
 Eigen::VectorXd late_flow(const MachineSeries& log, int cylinder, const Eigen::VectorXd& opening,
-                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late);
+                          const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& late,
+                          SectionPool* pool = nullptr);
 
 /// Fits gains and dead bands: the dead band has the smallest sum of squares, by grid search and golden section.
-SectionFit fit_dead_bands(const MachineSeries& log, int cylinder);
+SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, SectionPool* pool = nullptr);
 
 }  // namespace sparflow

@@ -114,7 +114,7 @@ class FlowSaturation final : public Effect {
                    log.machine->pump_of_cylinder(measured.index) != at)
       return false;
     const Form form = shape.size() > 1 ? static_cast<Form>(std::lround(shape[1])) : Form::kShared;
-    const Demand demand(log, at, shape[0], form);
+    const Demand demand(log, at, shape[0], form, measured.sections);
     if (!demand.known) return false;
     columns.setZero(log.samples(), 2);
     if (pump && form == Form::kByLine) {
@@ -188,7 +188,8 @@ class FlowSaturation final : public Effect {
     Eigen::VectorXd
         lost;  ///< [samples, Pa] pump pressure that is missing; empty where it is not known
 
-    Demand(const MachineSeries& log, int pump, double limit, Form form) {
+    Demand(const MachineSeries& log, int pump, double limit, Form form,
+           SectionPool* sections = nullptr) {
       const Machine& machine = *log.machine;
       const std::vector<int>& feeds = machine.pumps[static_cast<std::size_t>(pump)].feeds;
       fits.resize(log.cylinders.size());
@@ -210,10 +211,10 @@ class FlowSaturation final : public Effect {
         for (std::size_t f = 0; f < feeds.size(); ++f) {
           const auto c = static_cast<std::size_t>(feeds[f]);
           const Eigen::VectorXd& u = log.cylinders[c].command;
-          fits[c] =
-              fit_gains(log, feeds[f],
-                        u.cwiseProduct(by_pressure_drop(log, feeds[f]) ? log.cylinders[c].passed
-                                                                       : served[c]));
+          fits[c] = fit_gains(
+              log, feeds[f],
+              u.cwiseProduct(by_pressure_drop(log, feeds[f]) ? log.cylinders[c].passed : served[c]),
+              sections);
           for (Eigen::Index k = 0; k < u.size(); ++k) {
             if (std::isnan(u[k])) continue;
             asked(k, static_cast<Eigen::Index>(f)) =

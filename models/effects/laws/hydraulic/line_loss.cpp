@@ -88,7 +88,7 @@ class LineLoss final : public Effect {
     if (measured.index != at || at_valve(p)) return false;
     if (measured.about.size() == 2 && measured.about[0] + measured.about[1] > 0.0)
       std::copy(measured.about.begin(), measured.about.end(), p.begin());
-    const Passed flow = passed(log, at, p);
+    const Passed flow = passed(log, at, p, measured.sections);
     if (flow.share.size() == 0) return false;
     columns.setZero(log.samples(), 2);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {
@@ -137,7 +137,8 @@ class LineLoss final : public Effect {
     Eigen::VectorXd flow;   ///< [samples, m^3/s] into the supply chamber, >= 0
   };
   /// The share solves share = passed(drop - loss(share * flow)), whose right side falls with the share.
-  static Passed passed(const MachineSeries& log, int at, std::span<const double> p) {
+  static Passed passed(const MachineSeries& log, int at, std::span<const double> p,
+                       SectionPool* sections = nullptr) {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
     const LawOfModel& law = c.passing;
     Passed out;
@@ -150,7 +151,7 @@ class LineLoss final : public Effect {
     out.speed.resize(log.samples());
     out.flow.resize(log.samples());
     for (int turn = 0; turn < kTurns; ++turn) {
-      const SectionFit gains = fit_gains(log, at, opening.cwiseProduct(out.share));
+      const SectionFit gains = fit_gains(log, at, opening.cwiseProduct(out.share), sections);
       for (Eigen::Index k = 0; k < log.samples(); ++k) {
         const double u = opening[k];
         out.speed[k] = gains.gain(u) * u;

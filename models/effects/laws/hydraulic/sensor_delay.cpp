@@ -97,20 +97,21 @@ class SensorDelay final : public Effect {
     if (measured.kind != EvidenceKind::kFlow || !positions) return false;
     const int joint = log.machine->cylinders[static_cast<std::size_t>(measured.index)].joint;
     if (alone >= 0 && joint != alone) return false;
-    return speed_late(log, measured.index, shape[0], columns);
+    return speed_late(log, measured, shape[0], columns);
   }
 
  private:
   /// The logged speed is that of `delay` ago, and thus follows the command of then. The column is made of the command and not
   /// of the speed that it is to explain: with a share s the latter would be compared as (1 - s) v(t) + s v(t + delay), a mean
   /// that smooths noise and oscillations away, so that the likelihood would favour half a delay whether anything is late or not.
-  static bool speed_late(const MachineSeries& log, int cylinder, double delay,
+  static bool speed_late(const MachineSeries& log, const MeasuredQuantity& measured, double delay,
                          Eigen::MatrixXd& columns) {
-    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+    const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(measured.index)];
     const Eigen::VectorXd& opening = c.opening.size() > 0 ? c.opening : c.command;
     if (opening.size() == 0) return false;
-    columns = late_flow(log, cylinder, opening,
-                        [&](const Eigen::VectorXd& x) { return delayed(log, x, delay); });
+    columns = late_flow(
+        log, measured.index, opening,
+        [&](const Eigen::VectorXd& x) { return delayed(log, x, delay); }, measured.sections);
     return true;
   }
 

@@ -62,7 +62,7 @@ class ValveDeadband final : public Effect {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
     if (command.size() == 0) return false;
-    const SectionFit fit = fit_dead_bands(log, at);
+    const SectionFit fit = fit_dead_bands(log, at, measured.sections);
     const bool full_flow = shape[0] >= 0.5;
     columns.setZero(log.samples(), 2);
     for (Eigen::Index k = 0; k < log.samples(); ++k) {

@@ -81,7 +81,7 @@ class ValveLag final : public Effect {
       if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
       return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
     };
-    columns = late_flow(log, at, command, late);
+    columns = late_flow(log, at, command, late, measured.sections);
     return true;
   }
 };

@@ -91,7 +91,7 @@ class ValvePressureDrop final : public Effect {
     const Eigen::VectorXd lacking = lacking_flow(log, at, shape);
     if (lacking.size() == 0) return false;
     const Eigen::VectorXd passed = command.cwiseProduct((1.0 - lacking.array()).matrix());
-    const SectionFit fit = fit_gains(log, at, passed);
+    const SectionFit fit = fit_gains(log, at, passed, measured.sections);
     columns.resize(log.samples(), 1);
     for (Eigen::Index k = 0; k < log.samples(); ++k)
       columns(k, 0) = -fit.gain(command[k]) * command[k] * lacking[k];
