@@ -36,9 +36,20 @@ MatrixXd acting_columns(const MatrixXd& baseline) {
   return baseline(Eigen::all, used);
 }
 
+namespace {
+
+/// Whether what an effect of the model does stands in the baseline of a channel: the opening that a valve reaches by it.
+bool in_baseline(const AppliedEffect& effect, const MachineSeries& log, EvidenceKind kind) {
+  return kind == EvidenceKind::kFlow && effect.effect->acts_on_opening() &&
+         log.cylinders[static_cast<std::size_t>(effect.at)].reached.size() > 0;
+}
+
+}  // namespace
+
 VectorXd Evidence::known(std::size_t log, EvidenceKind kind, int index) const {
   VectorXd sum = VectorXd::Zero(series[log].samples());
   for (const AppliedEffect& effect : known_in(log)) {
+    if (in_baseline(effect, series[log], kind)) continue;
     const VectorXd one = effect_series(effect, series[log], kind, index);
     if (one.size() > 0) sum += one;
   }
@@ -49,6 +60,7 @@ VectorXd Evidence::smooth_known(std::size_t log, EvidenceKind kind, int index) c
   const Index n = series[log].samples();
   VectorXd to_filter = VectorXd::Zero(n), filtered = VectorXd::Zero(n);
   for (const AppliedEffect& effect : known_in(log)) {
+    if (in_baseline(effect, series[log], kind)) continue;
     const VectorXd one = effect_series(effect, series[log], kind, index);
     if (one.size() > 0) (effect.effect->columns_filtered() ? filtered : to_filter) += one;
   }

@@ -245,8 +245,10 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const MachineSignals& s = *signals_[log];
     e.series.push_back(make_series(model_, s));
-    if (!is_suspect(log) && in_references != nullptr)
+    if (!is_suspect(log) && in_references != nullptr) {
+      e.series[log] = with_reached(*in_references, std::move(e.series[log]));
       e.series[log].pumps = pumps_led_by(*in_references, e.series[log]);
+    }
     for (PumpSeries& p : e.series[log].pumps) {
       const bool late = p.following.effect != nullptr;
       if (late && !e.options.mechanisms.act(Mechanism::kPumpFollows)) p.following = {};
@@ -339,9 +341,12 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_command()) continue;
     commanded = true;
+    const CylinderSeries& s = e.series[log].cylinders[static_cast<std::size_t>(cylinder)];
+    const VectorXd& reached = s.reached.size() > 0 ? s.reached : c.command;
     MatrixXd base(c.command.size(), 2);
-    base.col(0) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMax(0.0));
-    base.col(1) = e.filter(log, EvidenceKind::kFlow, c.command.cwiseMin(0.0));
+    base.col(0) = e.filter(log, EvidenceKind::kFlow, reached.cwiseMax(0.0));
+    base.col(1) = e.filter(log, EvidenceKind::kFlow, reached.cwiseMin(0.0));
+    const VectorXd commanded_nearby = e.filter(log, EvidenceKind::kFlow, c.command.cwiseAbs());
     const VectorXd y = c.speed - e.smooth_known(log, EvidenceKind::kFlow, cylinder);
     const MachineSignals& signals = *signals_[log];
     Mask rows = signals.usable && !signals.edge;
@@ -349,7 +354,7 @@ void EvidenceCollector::add_flow_channel(int cylinder) {
     if (options().mechanisms.act(Mechanism::kVoid, !filled.all())) rows = rows && filled;
     b.add(log, rows, y, base, 0);
     for (Index k = 0; k < y.size(); ++k) {
-      if (base(k, 0) == 0.0 && base(k, 1) == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
+      if (commanded_nearby[k] == 0.0 && std::isfinite(y[k])) still.push_back(y[k]);
     }
   }
   b.channel.noise_floor =

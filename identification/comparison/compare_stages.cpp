@@ -95,7 +95,7 @@ void Comparison::flow(std::size_t i, std::vector<ComparedSeries>& out,
       const bool extend = c.direction[k] > 0;
       const double gain = extend ? m.valve_gain_extend : m.valve_gain_retract;
       const double area = extend ? cylinder.area_piston() : -cylinder.area_rod();
-      const double predicted = gain * std::abs(c.command[k]) + area * or_zero(c.flow_effect, k);
+      const double predicted = gain * std::abs(c.opening()[k]) + area * or_zero(c.flow_effect, k);
       if (gain > 0.0) put(s, k, c.flow[k], predicted, extend ? 0 : 1);
     }
     out.push_back(std::move(s));
@@ -123,7 +123,7 @@ bool Comparison::speeds_from_commands(Index k, const Pump& pump, std::vector<dou
     const double gain = extend ? m.valve_gain_extend : m.valve_gain_retract;
     const Cylinder& cylinder = machine_.cylinders[i];
     if (gain <= 0.0 || !cylinder.hydraulic()) return false;
-    speed[i] = gain * c.command[k] / (extend ? cylinder.area_piston() : cylinder.area_rod());
+    speed[i] = gain * c.opening()[k] / (extend ? cylinder.area_piston() : cylinder.area_rod());
     speed[i] += or_zero(c.flow_effect, k);
     if ((speed[i] > 0.0) != extend) speed[i] = 0.0;  // the command is inside the dead band
   }

@@ -32,7 +32,7 @@ std::vector<MachineSignals> all_with_effects(const CraneModel& model,
 bool has_no_effects(const MachineSignals& s) {
   const auto none = [](const CylinderSignals& c) {
     return c.pressure_effect.size() + c.return_effect.size() + c.pressure_sensor_effect.size() +
-               c.demand_effect.size() + c.flow_effect.size() ==
+               c.demand_effect.size() + c.flow_effect.size() + c.reached.size() ==
            0;
   };
   return !s.of_effective_machine && std::all_of(s.cylinders.begin(), s.cylinders.end(), none) &&

@@ -88,7 +88,7 @@ void learn_valves(const TrainingData& data, const LearnValveOptions& options, Fi
           const double area = extend ? cylinder.area_piston() : -cylinder.area_rod();
           const double own = c.flow[k] - area * or_zero(c.flow_effect, k);
           if (!std::isfinite(own)) continue;
-          command.push_back(c.command[k]);
+          command.push_back(c.opening()[k]);
           flow.push_back(own);
         }
       }

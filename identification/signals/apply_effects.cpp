@@ -148,6 +148,7 @@ void pressure_stage(const AppliedEffect& e, const MachineSeries& log, MachineSig
     if (e.effect->info().stage == EffectStage::kSensor) {
       add(sensor_effect(e, log, index), c.pressure_sensor_effect);
     }
+    if (e.effect->acts_on_opening() && c.reached.size() > 0) continue;  // a factor of the opening
     add(flow_effect(e, log, signals, index), c.flow_effect);
   }
 }
@@ -249,7 +250,7 @@ MachineSignals with_effects(const CraneModel& model, MachineSignals signals) {
   for (CylinderSignals& c : signals.cylinders) {
     c.model_force = c.predicted_force = c.static_force;
     for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,
-                        &c.demand_effect, &c.flow_effect})
+                        &c.demand_effect, &c.flow_effect, &c.reached})
       v->resize(0);
   }
   for (PumpSignals& p : signals.pumps) p.pressure_effect.resize(0);
@@ -260,6 +261,8 @@ MachineSignals with_effects(const CraneModel& model, MachineSignals signals) {
   if (model.effects.empty()) return signals;
   MachineSeries log = make_series(model, signals);
   log.machine = machine;
+  for (std::size_t i = 0; i < log.cylinders.size(); ++i)
+    signals.cylinders[i].reached = log.cylinders[i].reached;
   force_stage(model, log, signals);
   for (const AppliedEffect& e : model.effects) pressure_stage(e, log, signals);
   predict_demand(model, signals, log);

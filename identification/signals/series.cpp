@@ -149,7 +149,7 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
   out.pumps = pumps_led_by({}, out);  // first without effects, as these may depend on the demand
   out = with_passed_flows(model.effects, std::move(out));
   if (!model.effects.empty()) out.pumps = pumps_led_by(model.effects, out);
-  return out;
+  return with_reached(model.effects, std::move(out));
 }
 
 MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSeries series) {
@@ -158,6 +158,10 @@ MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSe
     c.opening = c.command;
     for (const AppliedEffect& e : effects)
       e.effect->shape_opening(static_cast<int>(i), e.at, e.values, c.opening);
+    c.late = c.opening;
+    if (c.late.size() == 0) continue;
+    for (const AppliedEffect& e : effects)
+      e.effect->delay_opening(series, static_cast<int>(i), e.at, e.values, c.late);
   }
   return series;
 }
@@ -184,6 +188,23 @@ MachineSeries with_passed_flows(const std::vector<AppliedEffect>& effects, Machi
     if (lost.size() > 0)
       c.passed =
           c.passing.effect->passed_flow(series, cylinder, c.passing.at, c.passing.values, lost);
+  }
+  return series;
+}
+
+MachineSeries with_reached(const std::vector<AppliedEffect>& effects, MachineSeries series) {
+  series = with_passed_flows(effects, with_openings(effects, std::move(series)));
+  for (std::size_t i = 0; i < series.cylinders.size(); ++i) {
+    CylinderSeries& c = series.cylinders[i];
+    c.reached.resize(0);
+    c.reached_share.resize(0);
+    const bool any = std::any_of(effects.begin(), effects.end(), [&](const AppliedEffect& e) {
+      return e.effect->acts_on_opening() && e.at == static_cast<int>(i);
+    });
+    if (!any || c.command.size() == 0) continue;
+    c.reached = c.late;
+    c.reached_share = c.passed;
+    if (c.passed.size() > 0) c.reached = c.reached.cwiseProduct(c.passed);
   }
   return series;
 }

@@ -17,6 +17,10 @@ MachineSeries make_series(const CraneModel& model, const MachineSignals& signals
 /// `make_series` computes them with the model's effects.
 MachineSeries with_openings(const std::vector<AppliedEffect>& effects, MachineSeries series);
 
+/// The same series with what the valves reach by the law of these effects: openings, passed flows, and their product
+/// (CylinderSeries::reached). `make_series` computes them with the model's effects.
+MachineSeries with_reached(const std::vector<AppliedEffect>& effects, MachineSeries series);
+
 /// The same series with the shares of the valves' flow that the pressure drop passes by the law of these effects
 /// (CylinderSeries::passed); `make_series` computes them with the model's effects.
 MachineSeries with_passed_flows(const std::vector<AppliedEffect>& effects, MachineSeries series);

@@ -314,7 +314,7 @@ MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signa
   MachineSignals out = signals;
   for (CylinderSignals& c : out.cylinders) {
     for (VectorXd* v : {&c.pressure_effect, &c.return_effect, &c.pressure_sensor_effect,
-                        &c.demand_effect, &c.flow_effect}) {
+                        &c.demand_effect, &c.flow_effect, &c.reached}) {
       v->resize(0);
     }
   }

@@ -62,9 +62,12 @@ struct CylinderSignals {
   Eigen::VectorXd return_effect;           ///< [Pa] added to the return chamber
   Eigen::VectorXd pressure_sensor_effect;  ///< [Pa] added to the working pressure by its sensor
   Eigen::VectorXd demand_effect;           ///< [Pa] added to working pressure + margin
-  Eigen::VectorXd flow_effect;             ///< [m/s] added to the rod speed by valve gain * command
+  Eigen::VectorXd flow_effect;             ///< [m/s] added to the rod speed by valve gain * opening
+  Eigen::VectorXd reached;  ///< [-] opening that the valve laws leave (CylinderSeries::reached)
 
   bool has_command() const { return command.size() > 0; }
+  /// What the valve's gain multiplies: the command, or what the model's laws of the valve leave of it. [samples, -]
+  const Eigen::VectorXd& opening() const { return reached.size() > 0 ? reached : command; }
   bool has_force() const { return force.size() > 0; }
   bool has_pressure() const { return working_pressure.size() > 0; }
   /// The static force; slim signals have no effects, and no column of their own for it.

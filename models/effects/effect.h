@@ -157,6 +157,13 @@ class Effect {
   virtual void shape_opening(int /*cylinder*/, int /*at*/, std::span<const double> /*p*/,
                              Eigen::VectorXd& /*opening*/) const {}
 
+  /// Delays a cylinder's opening [samples, -], as a dead band leaves it, in place (a valve lag).
+  virtual void delay_opening(const MachineSeries& /*log*/, int /*cylinder*/, int /*at*/,
+                             std::span<const double> /*p*/, Eigen::VectorXd& /*opening*/) const {}
+  /// Whether the rod speed that the effect leaves is that of CylinderSeries::reached: what shape_opening, delay_opening and passed_flow
+  /// leave of the command is a product, and no sum of what each takes from the command alone.
+  virtual bool acts_on_opening() const { return false; }
+
   /// Share of a valve's flow [samples, -] that the measured pressure drop over its edge passes; empty: no such law.
   /// The last argument is the pressure lost between valve and cylinder [samples, Pa], which is no drop over the edge; empty: nothing.
   virtual Eigen::VectorXd passed_flow(const MachineSeries& /*log*/, int /*cylinder*/, int /*at*/,

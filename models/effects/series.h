@@ -39,10 +39,15 @@ struct CylinderSeries {
   /// [-] valve opening that the model's valve effects without memory (a dead band) leave of the command; a valve lag acts
   /// on it. Empty: the command itself.
   Eigen::VectorXd opening;
+  Eigen::VectorXd
+      late;  ///< [-] the opening behind the model's valve lag. Empty: the command itself.
   /// [-] share of the valve's flow that the measured pressure drop over its edge passes, by the model's law. What lowers the pump's
   /// pressure shows in it, and beside it in no flow. Empty: the model has no such law.
   Eigen::VectorXd passed;
   LawOfModel passing;  ///< the law of `passed` (Effect::passed_flow)
+  /// [-] `late` times `passed` by the laws of the model whose series this is: the rod's speed over its gain. Empty: the model has none.
+  Eigen::VectorXd reached;
+  Eigen::VectorXd reached_share;  ///< [-] `passed` in it. Empty: the model has no such law.
   /// [Pa] pressures of the chambers, through the same filter as the position
   Eigen::VectorXd pressure_a, pressure_b;
   Eigen::VectorXd measured_a, measured_b;  ///< [Pa] the same as measured, before the filter

@@ -30,7 +30,7 @@ using Samples = SectionPool::Samples;
 double gain_of(const Samples& s, double dead_band, double* cost = nullptr) {
   double uu = 0.0, uv = 0.0, vv = 0.0;
   for (std::size_t k = 0; k < s.command.size(); ++k) {
-    const double u = std::max(0.0, s.command[k] - dead_band);
+    const double u = s.share[k] * std::max(0.0, s.command[k] - dead_band);
     uu += u * u;
     uv += u * s.speed[k];
     vv += s.speed[k] * s.speed[k];
@@ -40,16 +40,19 @@ double gain_of(const Samples& s, double dead_band, double* cost = nullptr) {
   return g;
 }
 
-Samples of_side(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command, int side) {
-  const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
+/// @param share of the flow that passes; empty: all of it
+Samples of_side(const CylinderSeries& c, const Eigen::VectorXd& command,
+                const Eigen::VectorXd& share, int side) {
   Samples s;
-  for (Eigen::Index k = 0; k < log.samples(); ++k) {
+  for (Eigen::Index k = 0; k < command.size(); ++k) {
     const double u = command[k] * side, v = c.speed[k] * side;
+    const double passes = share.size() > 0 ? share[k] : 1.0;
     /// Command up to which a valve is closed.
     /// @threshold [1] 0..1e-2; numerical: rounding of a logged zero
     constexpr double kNoCommand = 1e-6;
-    if (!(u > kNoCommand) || !std::isfinite(v)) continue;
+    if (!(u > kNoCommand) || !std::isfinite(v) || !std::isfinite(passes)) continue;
     s.command.push_back(u);
+    s.share.push_back(passes);
     s.speed.push_back(v);
   }
   return s;
@@ -95,6 +98,7 @@ SectionPool::Samples SectionPool::together(int cylinder, int side, Samples sampl
     const bool present = std::get<2>(place) == log_;
     const Samples& s = present ? samples : kept;
     all.command.insert(all.command.end(), s.command.begin(), s.command.end());
+    all.share.insert(all.share.end(), s.share.begin(), s.share.end());
     all.speed.insert(all.speed.end(), s.speed.begin(), s.speed.end());
   }
   return all;
@@ -104,7 +108,8 @@ SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::Vector
                      SectionPool* pool) {
   SectionFit fit;
   for (const int side : {1, -1}) {
-    Samples s = of_side(log, cylinder, command, side);
+    Samples s = of_side(log.cylinders[static_cast<std::size_t>(cylinder)], command,
+                        Eigen::VectorXd(), side);
     if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
     (side > 0 ? fit.gain_extend : fit.gain_retract) =
         s.command.size() < kFewest ? file_gain(*log.machine, cylinder, side) : gain_of(s, 0.0);
@@ -125,7 +130,7 @@ SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, SectionPool* p
   const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
   SectionFit fit = fit_gains(log, cylinder, c.command, pool);
   for (const int side : {1, -1}) {
-    Samples s = of_side(log, cylinder, c.command, side);
+    Samples s = of_side(c, c.command, c.passed, side);
     if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
     if (s.command.size() < kFewest) continue;
     const double u0 = best_dead_band(s);

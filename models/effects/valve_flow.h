@@ -26,9 +26,9 @@ struct SectionFit {
 /// Columns are computed for each log twice: the first time the fits keep their samples here, the second time they use those of all logs.
 class SectionPool {
  public:
-  /// |u| [-] and the rod speed in the commanded direction [m/s], for one direction.
+  /// |u| [-], share of the flow that passes [-] and the rod speed in the commanded direction [m/s], for one direction.
   struct Samples {
-    std::vector<double> command, speed;
+    std::vector<double> command, share, speed;
   };
   void begin(std::size_t log) { log_ = log; }
   void complete() { complete_ = true; }

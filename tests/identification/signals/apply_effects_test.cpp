@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "diagnosis/evidence/evidence.h"
 #include "identification/learning/fit.h"
@@ -12,7 +13,9 @@
 #include "models/effects/effective_machine.h"
 #include "models/effects/memory.h"
 #include "models/effects/registry.h"
+#include "models/effects/valve_flow.h"
 #include "tests/identification/arm_log.h"
+#include "tests/models/effects/effect_series.h"
 
 namespace sparflow {
 namespace {
@@ -68,7 +71,7 @@ TEST(WithOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
   series.cylinders[0].command = series.cylinders[1].command =
       (Eigen::VectorXd(6) << -1.0, -0.3, -0.05, 0.05, 0.3, 1.0).finished();
   AppliedEffect band = typical("valve_deadband:arm", machine);
-  band.values = {0.1, 0.2, 1.0};  // extending, retracting; the gain does not matter here
+  band.values = {0.1, 0.2, 0.0};  // extending, retracting, and the gain stays
   const MachineSeries banded = with_openings({band}, series);
   EXPECT_EQ(series.cylinders[0].opening.size(), 0) << "the series given stays as it is";
   const Eigen::VectorXd& opening = banded.cylinders[0].opening;
@@ -80,6 +83,113 @@ TEST(WithOpenings, SubtractTheDeadBandOfTheirOwnCylinder) {
   EXPECT_NEAR(opening[4], 0.2, 1e-12);
   EXPECT_NEAR(opening[5], 0.9, 1e-12);
   EXPECT_EQ(banded.cylinders[1].opening, series.cylinders[1].command) << "another cylinder's valve";
+  band.values[2] = 1.0;  // full command still gives full flow
+  const Eigen::VectorXd full = with_openings({band}, series).cylinders[0].opening;
+  EXPECT_NEAR(full[0], -1.0, 1e-12);
+  EXPECT_NEAR(full[4], 0.2 / 0.9, 1e-12);
+}
+
+/// A log of the first of two cylinders, whose valve has a dead band, is late, and has less pressure over its edge at times.
+class ReachedOpening : public ::testing::Test {
+ protected:
+  static constexpr double kGain = 0.14, kBand = 0.08, kTau = 0.2, kSetting = 12e5;
+  Machine machine = test_support::two_direct_cylinders();
+  MachineSeries log = test_support::two_cylinder_series(machine);
+
+  void SetUp() override {
+    for (Index k = 0; k < log.samples(); ++k)
+      log.pumps[0].pressure[k] =
+          log.cylinders[0].pressure_a[k] + 9e5 + 8e5 * std::sin(0.31 * log.time[k]);
+    log.cylinders[0].command = log.cylinders[0].command.cwiseAbs();  // extends only
+    log = with_reached(laws(kBand, 1.0, 1.0), std::move(log));
+    log.cylinders[0].speed = kGain * log.cylinders[0].reached;
+  }
+  /// @param lag, drop shares  @param band of the command
+  std::vector<AppliedEffect> laws(double band, double lag, double drop) const {
+    const auto law = [&](const char* id, std::vector<double> values) {
+      AppliedEffect e = typical(std::string(id) + ":lift", machine);
+      e.values = std::move(values);
+      return e;
+    };
+    return {law("valve_deadband", {band, band, 0.0}), law("valve_lag", {lag, kTau, 0.0}),
+            law("valve_pressure_drop", {drop, kSetting, 1.0})};
+  }
+  /// Speed of the rod by other values, less that of the log, for each unit. [samples, m/s]
+  Eigen::VectorXd slope(const std::vector<AppliedEffect>& other, double change) const {
+    const Eigen::VectorXd there = with_reached(other, log).cylinders[0].reached;
+    return kGain * (there - log.cylinders[0].reached) / change;
+  }
+  Eigen::MatrixXd columns(const char* id, std::vector<double> shape) const {
+    Eigen::MatrixXd out;
+    EXPECT_TRUE(find_effect(id)->columns(log, {EvidenceKind::kFlow, 0}, 0, std::move(shape), out))
+        << id;
+    return out;
+  }
+};
+
+TEST_F(ReachedOpening, IsTheProductOfBandLagAndPressureDrop) {
+  const CylinderSeries& c = log.cylinders[0];
+  Eigen::VectorXd opening = (c.command.array() - kBand).max(0.0);
+  opening = first_order_lag(log, opening, kTau);
+  int throttled = 0;
+  for (Index k = 0; k < log.samples(); ++k) {
+    const double drop = log.pumps[0].pressure[k] - c.pressure_a[k];
+    const bool open = c.command[k] > kBand;
+    const double passes = open ? std::sqrt(std::clamp(drop / kSetting, 0.0, 1.0)) : 1.0;
+    EXPECT_NEAR(c.reached[k], opening[k] * passes, 1e-12) << k;  // rounding
+    throttled += open && passes < 0.9 ? 1 : 0;
+  }
+  EXPECT_GT(throttled, 100);
+  EXPECT_EQ(log.cylinders[1].reached.size(), 0) << "another cylinder's valve";
+}
+
+TEST_F(ReachedOpening, ColumnsAreItsDerivatives) {
+  // Shares act linearly; what is left is rounding and the fit of the gain.
+  const Eigen::VectorXd lag = slope(laws(kBand, 1.1, 1.0), 0.1),
+                        drop = slope(laws(kBand, 1.0, 1.1), 0.1);
+  EXPECT_LT((columns("valve_lag", {kTau, 0.0}).col(0) - lag).norm(), 1e-9 * lag.norm());
+  EXPECT_LT((columns("valve_pressure_drop", {kSetting, 1.0}).col(0) - drop).norm(),
+            1e-9 * drop.norm());
+  // A dead band's column, and the gain fitted for it, leave the lag out: some per cent in the ramps of this log.
+  const Eigen::VectorXd band = slope(laws(kBand + 1e-3, 1.0, 1.0), 1e-3);
+  const Eigen::MatrixXd found = columns("valve_deadband", {0.0});
+  double settled = 0.0, squares = 0.0;
+  for (Index k = 0; k < log.samples(); ++k) {
+    const Eigen::VectorXd& u = log.cylinders[0].command;
+    const Index before = std::max<Index>(0, k - 60);  // six times the lag
+    if (u.segment(before, k - before + 1).minCoeff() < 2.0 * kBand) continue;
+    settled += std::pow(found(k, 0) - band[k], 2);
+    squares += band[k] * band[k];
+  }
+  EXPECT_GT(squares, 0.0);
+  EXPECT_LT(std::sqrt(settled / squares), 0.1);
+}
+
+// A pump without flow left slows the rod in one log; the same valve has the same columns in both all the same.
+TEST(SectionPool, AValveHasTheSameGainInAllLogs) {
+  const Machine machine = test_support::two_direct_cylinders();
+  std::vector<MachineSeries> logs(2, test_support::two_cylinder_series(machine));
+  logs[1].cylinders[0].speed.tail(1200) *= 0.3;
+  const auto columns = [&](std::size_t log, SectionPool* pool) {
+    Eigen::MatrixXd out;
+    find_effect("valve_deadband")
+        ->columns(logs[log], {EvidenceKind::kFlow, 0, {}, pool}, 0, std::vector<double>{0.0}, out);
+    return out;
+  };
+  const double apart =
+      columns(1, nullptr).cwiseAbs().maxCoeff() / columns(0, nullptr).cwiseAbs().maxCoeff();
+  EXPECT_LT(apart, 0.8) << "fitted to each log by itself they differ";
+  SectionPool pool;
+  for (std::size_t log = 0; log < 2; ++log) {
+    pool.begin(log);
+    columns(log, &pool);
+  }
+  pool.complete();
+  EXPECT_FALSE(pool.empty());
+  pool.begin(0);
+  const Eigen::MatrixXd first = columns(0, &pool);
+  pool.begin(1);
+  EXPECT_EQ(columns(1, &pool), first) << "both logs have the same commands";
 }
 
 TEST(ApplyEffects, ForcesAreTheExactChains) {

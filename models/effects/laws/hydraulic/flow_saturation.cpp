@@ -114,7 +114,7 @@ class FlowSaturation final : public Effect {
                    log.machine->pump_of_cylinder(measured.index) != at)
       return false;
     const Form form = shape.size() > 1 ? static_cast<Form>(std::lround(shape[1])) : Form::kShared;
-    const Demand demand(log, at, shape[0], form, measured.sections);
+    const Demand demand(log, at, shape[0], form);
     if (!demand.known) return false;
     columns.setZero(log.samples(), 2);
     if (pump && form == Form::kByLine) {
@@ -133,7 +133,7 @@ class FlowSaturation final : public Effect {
       return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;
     }
     const Eigen::VectorXd& command =
-        log.cylinders[static_cast<std::size_t>(measured.index)].command;
+        opening(log.cylinders[static_cast<std::size_t>(measured.index)]);
     if (by_pressure_drop(log, measured.index)) return false;
     const SectionFit& fit = demand.fits[static_cast<std::size_t>(measured.index)];
     const Eigen::VectorXd& served = demand.served[static_cast<std::size_t>(measured.index)];
@@ -145,6 +145,10 @@ class FlowSaturation final : public Effect {
  private:
   enum class Form { kShared, kSoft, kUnshared, kByLine };
 
+  /// [-] What the model's dead band and lag leave of the command.
+  static const Eigen::VectorXd& opening(const CylinderSeries& c) {
+    return c.late.size() > 0 ? c.late : c.command;
+  }
   /// Whether the model computes the flow of a cylinder from the measured pump pressure, in which the lack of flow shows already.
   static bool by_pressure_drop(const MachineSeries& log, int cylinder) {
     return log.cylinders[static_cast<std::size_t>(cylinder)].passed.size() > 0;
@@ -188,8 +192,7 @@ class FlowSaturation final : public Effect {
     Eigen::VectorXd
         lost;  ///< [samples, Pa] pump pressure that is missing; empty where it is not known
 
-    Demand(const MachineSeries& log, int pump, double limit, Form form,
-           SectionPool* sections = nullptr) {
+    Demand(const MachineSeries& log, int pump, double limit, Form form) {
       const Machine& machine = *log.machine;
       const std::vector<int>& feeds = machine.pumps[static_cast<std::size_t>(pump)].feeds;
       fits.resize(log.cylinders.size());
@@ -210,11 +213,11 @@ class FlowSaturation final : public Effect {
         asked.setZero();
         for (std::size_t f = 0; f < feeds.size(); ++f) {
           const auto c = static_cast<std::size_t>(feeds[f]);
-          const Eigen::VectorXd& u = log.cylinders[c].command;
-          fits[c] = fit_gains(
-              log, feeds[f],
-              u.cwiseProduct(by_pressure_drop(log, feeds[f]) ? log.cylinders[c].passed : served[c]),
-              sections);
+          const Eigen::VectorXd& u = opening(log.cylinders[c]);
+          fits[c] =
+              fit_gains(log, feeds[f],
+                        u.cwiseProduct(by_pressure_drop(log, feeds[f]) ? log.cylinders[c].passed
+                                                                       : served[c]));
           for (Eigen::Index k = 0; k < u.size(); ++k) {
             if (std::isnan(u[k])) continue;
             asked(k, static_cast<Eigen::Index>(f)) =

@@ -79,6 +79,8 @@ class LineLoss final : public Effect {
   }
   bool depends_on_size() const override { return true; }
 
+  bool acts_on_opening() const override { return true; }
+
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow)
@@ -145,7 +147,7 @@ class LineLoss final : public Effect {
     if (law.effect == nullptr) return out;
     out.without = law.effect->passed_flow(log, at, law.at, law.values, {});
     if (out.without.size() == 0) return out;
-    const Eigen::VectorXd& opening = c.opening.size() > 0 ? c.opening : c.command;
+    const Eigen::VectorXd& opening = c.late.size() > 0 ? c.late : c.command;
     const Cylinder& cylinder = log.machine->cylinders[static_cast<std::size_t>(at)];
     out.share = out.without;
     out.speed.resize(log.samples());

@@ -107,7 +107,9 @@ class SensorDelay final : public Effect {
   static bool speed_late(const MachineSeries& log, const MeasuredQuantity& measured, double delay,
                          Eigen::MatrixXd& columns) {
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(measured.index)];
-    const Eigen::VectorXd& opening = c.opening.size() > 0 ? c.opening : c.command;
+    const Eigen::VectorXd& opening = c.reached.size() > 0   ? c.reached
+                                     : c.opening.size() > 0 ? c.opening
+                                                            : c.command;
     if (opening.size() == 0) return false;
     columns = late_flow(
         log, measured.index, opening,

@@ -51,16 +51,20 @@ class ValveDeadband final : public Effect {
   void shape_opening(int cylinder, int at, std::span<const double> p,
                      Eigen::VectorXd& opening) const override {
     if (cylinder != at) return;
+    const bool full_flow = p[2] >= 0.5;
     for (double& u : opening) {
-      if (u > 0.0) u = std::max(0.0, u - p[0]);
-      if (u < 0.0) u = std::min(0.0, u + p[1]);
+      const double band = u > 0.0 ? p[0] : p[1], beyond = std::max(0.0, std::abs(u) - band);
+      u = std::copysign(full_flow ? beyond / (1.0 - band) : beyond, u);
     }
   }
+
+  bool acts_on_opening() const override { return true; }
 
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const Eigen::VectorXd& command = log.cylinders[static_cast<std::size_t>(at)].command;
+    const Eigen::VectorXd& share = log.cylinders[static_cast<std::size_t>(at)].reached_share;
     if (command.size() == 0) return false;
     const SectionFit fit = fit_dead_bands(log, at, measured.sections);
     const bool full_flow = shape[0] >= 0.5;
@@ -76,6 +80,7 @@ class ValveDeadband final : public Effect {
       double lack = fit.gain(command[k]);
       if (full_flow) lack *= 1.0 - std::min(u, 1.0);
       if (u < knee) lack = fit.gain(command[k]) * (full_flow ? 1.0 - knee : 1.0) * u / knee;
+      if (share.size() > 0) lack *= share[k];
       columns(k, command[k] > 0.0 ? 0 : 1) = command[k] > 0.0 ? -lack : lack;
     }
     return columns.array().isNaN().any() || columns.array().abs().maxCoeff() > 0.0;

@@ -63,6 +63,16 @@ class ValveLag final : public Effect {
   }
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
 
+  bool acts_on_opening() const override { return true; }
+  void delay_opening(const MachineSeries& log, int cylinder, int at, std::span<const double> p,
+                     Eigen::VectorXd& opening) const override {
+    if (cylinder != at) return;
+    const std::span<const double> shape = p.subspan(1);
+    const Eigen::VectorXd reached =
+        late(log, opening.cwiseMax(0.0), shape) + late(log, opening.cwiseMin(0.0), shape);
+    opening += p[0] * (reached - opening);
+  }
+
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
@@ -70,19 +80,31 @@ class ValveLag final : public Effect {
     // Inside a dead band that the model contains the command has no flow that could be delayed.
     const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
     if (command.size() == 0) return false;
+    const Eigen::VectorXd extend = command.cwiseMax(0.0), retract = command.cwiseMin(0.0);
+    const Eigen::VectorXd late_extend = late(log, extend, shape),
+                          late_retract = late(log, retract, shape);
+    Eigen::VectorXd reached = late_extend + late_retract;
+    if (c.passed.size() > 0) reached = reached.cwiseProduct(c.passed);
+    // The gains are those of the late opening; those of the opening itself would be biased towards zero.
+    const SectionFit fit = fit_gains(log, at, reached, measured.sections);
+    columns =
+        fit.gain_extend * (late_extend - extend) + fit.gain_retract * (late_retract - retract);
+    if (c.reached_share.size() > 0) columns.array().colwise() *= c.reached_share.array();
+    return true;
+  }
+
+ private:
+  static Eigen::VectorXd late(const MachineSeries& log, const Eigen::VectorXd& x,
+                              std::span<const double> shape) {
     /// Value of the form above which the lag is a pure delay.
     /// @threshold [1] 0.5..1; derived: the grid's values are 0, 0.5 and 1
     constexpr double kDelayFrom = 0.75;
     /// Value of the form below which the lag is of first order.
     /// @threshold [1] 0..0.5; derived: the grid's values are 0, 0.5 and 1
     constexpr double kFirstOrderTo = 0.25;
-    const auto late = [&](const Eigen::VectorXd& x) {
-      if (shape[1] > kDelayFrom) return delayed(log, x, shape[0]);
-      if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
-      return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
-    };
-    columns = late_flow(log, at, command, late, measured.sections);
-    return true;
+    if (shape[1] > kDelayFrom) return delayed(log, x, shape[0]);
+    if (shape[1] < kFirstOrderTo) return first_order_lag(log, x, shape[0]);
+    return first_order_lag(log, first_order_lag(log, x, 0.5 * shape[0]), 0.5 * shape[0]);
   }
 };
 

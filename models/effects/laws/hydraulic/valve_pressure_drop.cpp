@@ -83,11 +83,13 @@ class ValvePressureDrop final : public Effect {
   std::vector<EvidenceKind> shows_in() const override { return {EvidenceKind::kFlow}; }
   bool needs_reference(std::span<const double> shape) const override { return shape[1] < 0.5; }
 
+  bool acts_on_opening() const override { return true; }
+
   bool columns(const MachineSeries& log, const MeasuredQuantity& measured, int at,
                std::span<const double> shape, Eigen::MatrixXd& columns) const override {
     if (measured.kind != EvidenceKind::kFlow || measured.index != at) return false;
     const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(at)];
-    const Eigen::VectorXd& command = c.opening.size() > 0 ? c.opening : c.command;
+    const Eigen::VectorXd& command = c.late.size() > 0 ? c.late : c.command;
     const Eigen::VectorXd lacking = lacking_flow(log, at, shape);
     if (lacking.size() == 0) return false;
     const Eigen::VectorXd passed = command.cwiseProduct((1.0 - lacking.array()).matrix());
