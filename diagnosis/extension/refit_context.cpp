@@ -150,6 +150,9 @@ EffectEstimate RefitContext::estimate(CraneModel base, const EffectSet& effects,
   how.evidence = options_.diagnose.evidence;
   EffectEstimate estimate = estimate_effects(
       base, wanted, {signals_, references_, leave_out, std::move(in_references)}, progress, how);
+  // an effect that only the samples left out show is not known to a model of the others
+  std::erase_if(base.effects,
+                [&](const AppliedEffect& k) { return in(wanted, k) && !in(estimate.effects, k); });
   std::vector<AppliedEffect> all;
   for (const EffectAt& e : effects.all) {
     for (const auto* list : {&estimate.effects, &base.effects}) {
@@ -276,6 +279,7 @@ Evidence RefitContext::evidence_on_fold(std::size_t f, const EffectAt& effect, C
   std::vector<Mask> others;
   for (const Mask& held : fold(f)) others.push_back(!held);
   for (EvidenceChannel& c : evidence.channels) c = without_rows(c, others);
+  std::erase_if(evidence.channels, [](const EvidenceChannel& c) { return c.rows() == 0; });
   return evidence;
 }
 

@@ -149,6 +149,7 @@ class Estimator {
     }
     if (leave_out_.empty()) return evidence;
     for (EvidenceChannel& c : evidence.channels) c = without_rows(c, leave_out_);
+    std::erase_if(evidence.channels, [](const EvidenceChannel& c) { return c.rows() == 0; });
     return evidence;
   }
 
@@ -177,6 +178,7 @@ class Estimator {
       if (!acting.empty() && designs_.size() < options_.starts.size())
         add_start(acting, options_.starts[designs_.size()]);
     }
+    if (acting.empty() && !leave_out_.empty()) return;  // those left out show it alone
     if (acting.empty()) {
       throw InputError(
           {}, effect_key(e.effect->info(), base_.machine, e.at),

@@ -38,7 +38,8 @@ struct EstimateLogs {
 };
 
 struct EffectEstimate {
-  std::vector<AppliedEffect> effects;  ///< in the order of `wanted`, with 95 % intervals
+  /// In the order of `wanted`, with 95 % intervals; without those that only samples left out show.
+  std::vector<AppliedEffect> effects;
   std::vector<bool>
       significant;  ///< of each: its joint 95 % region (sampling error alone) excludes zero
   std::vector<std::string> notes;  ///< which parameters lie on their bounds; whole sentences
@@ -48,7 +49,7 @@ struct EffectEstimate {
 /// @param model its margins give the first estimate of pump demand; its effects are initial values of those in `wanted`
 ///        and are kept as they are otherwise
 /// @param wanted every effect to be estimated, once each
-/// @throws InputError when one of the effects does not act on any channel of the logs
+/// @throws InputError when one of the effects does not act on any channel of the logs, none of whose samples are left out
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 EstimateLogs logs, const SearchProgress& progress = {},
                                 const EstimateOptions& options = {});

@@ -90,27 +90,34 @@ double best_dead_band(const Samples& s) {
 
 }  // namespace
 
-SectionPool::Samples SectionPool::together(int cylinder, int side, Samples samples) {
-  if (!complete_) return samples_[{cylinder, side, log_}] = std::move(samples);
-  Samples all;
-  for (const auto& [place, kept] : samples_) {
-    if (std::get<0>(place) != cylinder || std::get<1>(place) != side) continue;
-    const bool present = std::get<2>(place) == log_;
-    const Samples& s = present ? samples : kept;
+void SectionPool::complete() {
+  complete_ = true;
+  for (const auto& [place, s] : samples_) {
+    Samples& all = all_[{std::get<0>(place), std::get<1>(place)}];
     all.command.insert(all.command.end(), s.command.begin(), s.command.end());
     all.share.insert(all.share.end(), s.share.begin(), s.share.end());
     all.speed.insert(all.speed.end(), s.speed.begin(), s.speed.end());
   }
-  return all;
+}
+
+const SectionPool::Samples& SectionPool::together(int cylinder, int side, Samples samples) {
+  if (complete_) return all_[{cylinder, side}];
+  return samples_[{cylinder, side, log_}] = std::move(samples);
+}
+
+double SectionPool::dead_band(int cylinder, int side, const std::function<double()>& search) {
+  if (!complete_) return search();
+  const auto known = bands_.find({cylinder, side});
+  return known != bands_.end() ? known->second : bands_[{cylinder, side}] = search();
 }
 
 SectionFit fit_gains(const MachineSeries& log, int cylinder, const Eigen::VectorXd& command,
                      SectionPool* pool) {
   SectionFit fit;
   for (const int side : {1, -1}) {
-    Samples s = of_side(log.cylinders[static_cast<std::size_t>(cylinder)], command,
-                        Eigen::VectorXd(), side);
-    if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
+    const Samples own = of_side(log.cylinders[static_cast<std::size_t>(cylinder)], command,
+                                Eigen::VectorXd(), side);
+    const Samples& s = pool != nullptr ? pool->together(cylinder, side, own) : own;
     (side > 0 ? fit.gain_extend : fit.gain_retract) =
         s.command.size() < kFewest ? file_gain(*log.machine, cylinder, side) : gain_of(s, 0.0);
   }
@@ -130,10 +137,11 @@ SectionFit fit_dead_bands(const MachineSeries& log, int cylinder, SectionPool* p
   const CylinderSeries& c = log.cylinders[static_cast<std::size_t>(cylinder)];
   SectionFit fit = fit_gains(log, cylinder, c.command, pool);
   for (const int side : {1, -1}) {
-    Samples s = of_side(c, c.command, c.passed, side);
-    if (pool != nullptr) s = pool->together(cylinder, side, std::move(s));
+    const Samples own = of_side(c, c.command, c.passed, side);
+    const Samples& s = pool != nullptr ? pool->together(cylinder, side, own) : own;
     if (s.command.size() < kFewest) continue;
-    const double u0 = best_dead_band(s);
+    const auto search = [&] { return best_dead_band(s); };
+    const double u0 = pool != nullptr ? pool->dead_band(cylinder, side, search) : search();
     (side > 0 ? fit.dead_band_extend : fit.dead_band_retract) = u0;
     (side > 0 ? fit.gain_extend : fit.gain_retract) = gain_of(s, u0);
   }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "models/effects/series.h"
@@ -31,14 +32,18 @@ class SectionPool {
     std::vector<double> command, share, speed;
   };
   void begin(std::size_t log) { log_ = log; }
-  void complete() { complete_ = true; }
+  void complete();
   /// No effect fits a section of these.
   bool empty() const { return samples_.empty(); }
   /// Keeps the samples of the present log in place of former ones, or, once complete, returns those of all logs.
-  Samples together(int cylinder, int side, Samples samples);
+  const Samples& together(int cylinder, int side, Samples samples);
+  /// Where the dead band of these samples ends, by `search`; once complete it is searched for once. [-]
+  double dead_band(int cylinder, int side, const std::function<double()>& search);
 
  private:
   std::map<std::tuple<int, int, std::size_t>, Samples> samples_;  // by cylinder, side, log
+  std::map<std::pair<int, int>, Samples> all_;                    // by cylinder, side
+  std::map<std::pair<int, int>, double> bands_;                   // the same
   std::size_t log_ = 0;
   bool complete_ = false;
 };

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/extension/refit_context.h"
+#include "diagnosis/selection/effect_estimate.h"
 #include "identification/learning/fit.h"
 #include "models/effects/registry.h"
 #include "tests/diagnosis/hidden_case.h"
@@ -61,6 +62,19 @@ TEST_F(CrossValidation, AChangeOfOneEffectGivesTheErrorsOfAWholeEstimate) {
   // and it is another model than before: dry friction explains these forces better
   EXPECT_GT(error_of(changed.errors, "force", "boom"),
             1.02 * error_of(both.errors, "force", "boom"));
+}
+
+/// A fold may have the only motions in which an effect acts. The model of the others does not know it, and the rest is estimated.
+TEST_F(CrossValidation, AnEffectThatOnlyTheSamplesLeftOutShowIsNotEstimated) {
+  const CraneModel model = fit(machine, logs.suspects).model;
+  const EffectAt friction = effect("coulomb_friction:boom"), leak = effect("leakage:jib");
+  const MachineSignals signals = make_signals(machine, hidden.train);
+  const Mask boom_moves = signals.cylinders[static_cast<std::size_t>(friction.at)].moving;
+  EXPECT_EQ(estimate_effects(model, {friction, leak}, {{signals}}).effects.size(), 2u);
+  const EffectEstimate others =
+      estimate_effects(model, {friction, leak}, {{signals}, {}, {boom_moves}});
+  ASSERT_EQ(others.effects.size(), 1u);
+  EXPECT_EQ(others.effects[0].effect, leak.effect);
 }
 
 }  // namespace
