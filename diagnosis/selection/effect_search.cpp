@@ -261,8 +261,11 @@ class Search {
       without.push_back(&p);
       with.push_back(&p);
     }
-    const double gain = search_.fit(with, &fit).total() - search_.fit(without, &fit).total() -
-                        search_.penalty_of(one.design);
+    // The likelihood has more than one maximum: what is found may pass into the noise. Of nested designs that would make gains negative.
+    const auto most = [&](const std::vector<const EffectDesign*>& designs) {
+      return std::max(search_.fit(designs, &fit).total(), search_.fit(designs).total());
+    };
+    const double gain = most(with) - most(without) - search_.penalty_of(one.design);
     if (tracing())
       fmt::print(stderr, "  {} beside other powers of {}: {:.1f} nats\n",
                  search_.key(one.design.effect), fmt::join(names, ", "), gain);
@@ -283,12 +286,7 @@ class Search {
       result.notes.push_back(
           fmt::format("{} is removed again: {}", search_.key(found[i].design.effect), why));
       if (tracing()) fmt::print(stderr, "  {}\n", result.notes.back());
-      for (std::size_t c = 0; c < search_.candidates.size(); ++c) {
-        if (search_.candidates[c].effect == found[i].design.effect)
-          search_.refuse(c, found[i], {}, false);
-      }
-      search_.allow_beside(found[i].design.effect);
-      found.erase(found.begin() + static_cast<std::ptrdiff_t>(i));
+      search_.drop(found, i);
       current = search_.fit(designs_of(found));
       return true;
     }

@@ -28,9 +28,10 @@ struct SearchOptions {
   /// @threshold [steps] 1..; chosen: bounds the time of a search that refuses one effect after
   /// another
   int steps_per_effect = 3;
-  /// Rounds of adding, exchanging and dropping after which a search ends.
-  /// @threshold [rounds] 1..; chosen: ends a search in which an effect is added and dropped in turn
-  int rounds = 3;
+  /// Rounds of adding, exchanging and dropping after which a search ends; each drops one effect.
+  /// @threshold [rounds] 1..; chosen: a guard, ends a search in which an effect is added and dropped in turn. References of a machine
+  /// of three cylinders need up to five; with three the effects that the last drop makes way for were never tried
+  int rounds = 10;
   /// Further searches on evidence with the load-sensing leaders that the last search implies.
   /// @threshold [searches] 0..; chosen: ends a search in which two leaders alternate
   int leader_searches = 3;

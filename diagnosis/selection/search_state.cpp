@@ -68,6 +68,17 @@ void SearchState::allow_beside(const EffectAt& removed) {
   }
 }
 
+void SearchState::drop(std::vector<FoundEffect>& found, std::size_t index) {
+  const FoundEffect dropped = std::move(found[index]);
+  found.erase(found.begin() + static_cast<std::ptrdiff_t>(index));
+  allow_beside(dropped.design.effect);
+  const bool form_error_alone =
+      !dropped.not_significant && passes_without_form_error(dropped, options, mechanisms());
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    if (candidates[k].effect == dropped.design.effect) refuse(k, dropped, found, form_error_alone);
+  }
+}
+
 std::vector<bool> SearchState::skipped(const std::vector<FoundEffect>& found) const {
   const auto is_in = [&](const EffectAt& e) {
     return std::any_of(found.begin(), found.end(),

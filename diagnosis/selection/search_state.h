@@ -41,6 +41,9 @@ struct SearchState {
   /// Refuses a candidate that fails an acceptance test beside what was found, of which it is not yet a part.
   void refuse(std::size_t candidate, const FoundEffect& tested,
               const std::vector<FoundEffect>& found, bool form_error_alone);
+  /// Takes an effect out that fails an acceptance test since later effects were found, and refuses it: where only their model-form
+  /// error speaks against it, until one of them is taken out.
+  void drop(std::vector<FoundEffect>& found, std::size_t index);
   /// Makes the refusals void that rest on the model-form error of an effect that is no longer found.
   void allow_beside(const EffectAt& removed);
   /// Computes the statistics of the acceptance tests of found[index]. @param fit of all found

@@ -16,11 +16,11 @@ struct LevelComparison {
   double variance = 0.0;             ///< of that
   double freedom = 1.0;              ///< of that variance (Welch and Satterthwaite)
   double explained = 0.0;  ///< what load and speed explain of the difference of the mean levels
-  double largest =
-      0.0;  ///< largest level of a suspect block over the mean of the references at its work
-  double largest_in_references = 0.0;  ///< the same of theirs
-  double largest_deviation =
-      1.0;  ///< that a further block at the work of the largest one would have
+  /// Level of the suspect block that deviates most, over the mean of the references at its work.
+  double largest = 0.0;
+  double largest_in_references = 0.0;  ///< largest level of theirs
+  /// That a further block of as few rows would have at the work of that one.
+  double largest_deviation = 1.0;
 };
 
 /// @param residual [rows, SI]

@@ -294,12 +294,14 @@ class DifferenceSearch {
         std::erase(now_.candidates, f.design.effect);
         continue;
       }
-      // Another value of what the references have joins it once and is no candidate afterwards.
+      // Another value of what the references have joins it once and is no candidate afterwards. Neither is what the references do not
+      // show and the suspect logs do not prove: beside its own law of all logs it would be found once more, by the same residual.
       const bool had_before =
           std::any_of(now_.evidence.shared.begin(), now_.evidence.shared.end(),
                       [&](const AppliedEffect& e) { return same_place(e, f.design.effect); });
       add(applied_of(all[i].law ? *all[i].law : f));
-      if (had_before) std::erase(now_.candidates, f.design.effect);
+      if (had_before || all[i].there == InReferences::kVaries)
+        std::erase(now_.candidates, f.design.effect);
       if (all[i].there == InReferences::kAlike) list_as_lacking(d, f.design.effect);
     }
     return again;

@@ -145,6 +145,26 @@ TEST(SearchMoves, ARefusalForModelFormErrorIsVoidWithoutTheEffectThatHasIt) {
   EXPECT_TRUE(search.skipped({})[1]) << "it had failed another test";
 }
 
+TEST(SearchMoves, WhatIsDroppedForModelFormErrorIsACandidateAgainWithoutTheEffectThatHasIt) {
+  const Refused r;
+  SearchState search(r.evidence, r.all(), r.options, r.progress);
+  std::vector<FoundEffect> found{r.of(r.first), r.of(r.second), r.of(r.third)};
+  for (FoundEffect& f : found) {
+    f.size = 3.0;
+    f.absorbed_where_seen = 0.0;
+    f.held_out = 50.0;
+  }
+  found[1].not_significant = true;
+  search.drop(found, 0);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_TRUE(search.skipped({})[0]);
+  search.drop(found, 0);
+  EXPECT_FALSE(search.skipped({})[0]) << "the second, beside which it was dropped, is not found";
+  EXPECT_TRUE(search.skipped({})[1]);
+  search.drop(found, 0);
+  EXPECT_TRUE(search.skipped({})[1]) << "it was not significant";
+}
+
 TEST(SearchMoves, AnEffectWhoseRefusalIsVoidTakesThePlaceOfOneThatExplainsLess) {
   const Refused r;
   SearchState search(r.evidence, r.all(), r.options, r.progress);
