@@ -30,7 +30,7 @@ struct SearchOptions {
   int steps_per_effect = 3;
   /// Rounds of adding, exchanging and dropping after which a search ends; each drops one effect.
   /// @threshold [rounds] 1..; chosen: a guard, ends a search in which an effect is added and dropped in turn. References of a machine
-  /// of three cylinders need up to five; with three the effects that the last drop makes way for were never tried
+  /// of three cylinders need up to four; with three the effects that the last drop makes way for were never tried
   int rounds = 10;
   /// Further searches on evidence with the load-sensing leaders that the last search implies.
   /// @threshold [searches] 0..; chosen: ends a search in which two leaders alternate
