@@ -19,11 +19,6 @@ struct Pendulum {
   /// Moves by dt [s] while the pull changes linearly from one value to another.
   void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt,
             const SwingDecay& swing);
-  /// Rope's force on the point beyond that of a weight fixed to it, per mass and rope's length [1/s^2].
-  Eigen::Vector3d beyond_fixed(const Eigen::Vector3d& pull) const {
-    return pull - down * (down.dot(pull) + rate.squaredNorm());
-  }
-
  private:
   Pendulum moved(const Eigen::Vector3d& by_down, const Eigen::Vector3d& by_rate) const {
     return {down + by_down, rate + by_rate};

@@ -159,7 +159,7 @@ class SwingMotion {
         const Index last = rows[static_cast<std::size_t>(j - 1)];
         p.move(before, now, log_.time[i] - log_.time[last], swing_);
       }
-      pull->row(j) = rope_ * p.beyond_fixed(now);
+      pull->row(j) = rope_ * p.slope(now, swing_.decay);
       before = now;
     }
     return p;
@@ -343,7 +343,7 @@ Eigen::MatrixX3d pull_of_hanging_weight(const MachineSeries& log,
         p.move(pull, now, log.time[i] - log.time[i - 1], swing);
       }
       pull = now;
-      if (a.allFinite()) out.row(i) = rope * p.beyond_fixed(pull);
+      if (a.allFinite()) out.row(i) = rope * p.slope(pull, swing.decay);
     }
   }
   return out;

@@ -25,8 +25,9 @@ std::vector<LoadPart> swinging_parts(const MachineSeries& log, const TipMotion& 
 /// Acceleration with which a weight on a rope pulls the tip beyond one that is fixed to it [samples x 3, m/s^2, base frame]: the
 /// spherical pendulum below a point with acceleration a. With n the unit vector from the tip to the weight, G = (g - a) / rope,
 ///   n'' = G - n (n G) - n |n'|^2 - 2 damping omega n',   omega^2 = |g| / rope,
-/// the rope carries T = rope (n G + |n'|^2) per mass, and the result is -T n + g - a. Every run begins at rest in the direction of
-/// g - a, every part in its own state. For small deflections its horizontal part is the tip's acceleration through a second-order lag, less that acceleration.
+/// the weight's own acceleration is a + rope n'', and the result is rope n'': by Newton's second law the suspension pulls with all that
+/// gravity does not, so that damping, which is its pins' and its rope's (the air's is a hundredth of it), acts on the tip as well. Every
+/// run begins at rest in the direction of g - a, every part in its own state. For small deflections its horizontal part is the tip's acceleration through a second-order lag, less that acceleration.
 /// @param acceleration [samples x 3, m/s^2] of the tip; where it is NaN the last one continues
 /// @param rope [m] > 0  @param damping ratio of the free sway [-] >= 0  @param parts in the order of the rows; may be empty
 Eigen::MatrixX3d pull_of_hanging_weight(const MachineSeries& log,

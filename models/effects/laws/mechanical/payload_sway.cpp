@@ -46,9 +46,9 @@ class PayloadSway final : public Effect {
               // A wider peak than a weight without damping has: the search over ropes meets it.
               {0.06}}},
         .equation =
-            "F = F_static + J^T share payload (g - a_tip - T n), n'' = G - n (n G + |n'|^2) - "
-            "2 damping n' (g/rope)^0.5, G = (g - a_tip) / rope, T = rope (n G + |n'|^2); n = unit "
-            "vector from tip to payload, T = rope's force per mass",
+            "F = F_static + J^T share payload rope n'', n'' = G - n (n G + |n'|^2) - "
+            "2 damping n' (g/rope)^0.5, G = (g - a_tip) / rope; n = unit vector from tip to "
+            "payload, whose acceleration is a_tip + rope n''",
         .signals = {"cylinder force or both chamber pressures", "position", "payload"},
         .confused_with = {"inertia", "structural_flex"},
         .separated_by =

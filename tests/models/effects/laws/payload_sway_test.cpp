@@ -80,9 +80,7 @@ std::vector<Vector3d> rope_pull(const Machine& machine, const VectorXd& time, do
       e += dt * middle_v;
       v += dt * slope(t + 0.5 * dt, middle_e, middle_v);
     }
-    // the rope's own force: the damping across it is the air's
-    const Vector3d along = e.normalized();
-    out.push_back(along * along.dot(spring(e, v)) + machine.gravity);
+    out.push_back(spring(e, v) + machine.gravity);
   }
   return out;
 }
