@@ -62,6 +62,11 @@ VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x)
   return convolved(x, kernel, series[log].runs);
 }
 
+VectorXd Evidence::behind_force(std::size_t log, const VectorXd& x) const {
+  const VectorXd& kernel = kernels_[log].behind_force;
+  return kernel.size() > 1 ? convolved(x, kernel, series[log].runs) : x;
+}
+
 bool is_nonlinear_in_parameter(const Effect& effect) {
   return effect.changes_machine() && effect.info().place == EffectPlace::kMachine &&
          effect.info().parameters.size() == 1;
@@ -142,6 +147,11 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
     }
     if (inertial.size() > 0)
       raw += inertial.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
+    if (channel.kind == EvidenceKind::kForce) {
+      for (Index c = 0; c < raw.cols(); ++c)
+        raw.col(c) = behind_force(
+            log, raw.col(c).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
+    }
     if (result.size() == 0) result.setZero(channel.rows(), raw.cols());
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {
       if (channel.log[b] != static_cast<int>(log)) continue;

@@ -6,7 +6,8 @@
 ///
 /// Filters. A force is compared with an acceleration from a differentiating filter, so both must pass the same
 /// low-pass. For the force that is the kernel g with g'' = h (h: the filter's second-derivative kernel), for a command
-/// compared with a speed the kernel with g' = h, and for pressures the smoothing kernel itself.
+/// compared with a speed the kernel with g' = h, and for pressures the smoothing kernel itself. What is left of a force
+/// passes one more, wider low-pass, because the noise of the accelerations is far above that of the pressures.
 #include <optional>
 #include <span>
 #include <string>
@@ -106,11 +107,14 @@ struct Evidence {
   friend class EvidenceCollector;
   struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
+    Eigen::VectorXd behind_force;  // of forces and their signatures behind all others
   };
   std::vector<Kernels> kernels_;
   std::vector<AppliedEffect> known_,
       known_in_references_;  // effects of the model that act in suspect logs, in reference logs
   Eigen::VectorXd filter(std::size_t log, EvidenceKind kind, const Eigen::VectorXd& x) const;
+  /// What has passed the filter of a force, behind its further low-pass; x where there is none.
+  Eigen::VectorXd behind_force(std::size_t log, const Eigen::VectorXd& x) const;
   const std::vector<AppliedEffect>& known_in(std::size_t log) const {
     return log < suspects ? known_ : known_in_references_;
   }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
@@ -190,6 +191,27 @@ BranchData branch_data(const MachineSignals& signals, const MachineSeries& serie
 
 }  // namespace
 
+namespace {
+
+/// Kernel of unit gain that falls to zero as a cosine (F. J. Harris (1978), Proc. IEEE 66, 51, the Hann window).
+/// @param width full width [samples]
+VectorXd raised_cosine(double width) {
+  const auto half = static_cast<Index>(std::lround(0.5 * width));
+  const VectorXd at =
+      VectorXd::LinSpaced(2 * half + 1, -static_cast<double>(half), static_cast<double>(half)) *
+      (std::numbers::pi / static_cast<double>(half + 1));
+  const VectorXd kernel = 1.0 + at.array().cos();
+  return kernel / kernel.sum();
+}
+
+VectorXd full_convolution(const VectorXd& a, const VectorXd& b) {
+  VectorXd out = VectorXd::Zero(a.size() + b.size() - 1);
+  for (Index k = 0; k < b.size(); ++k) out.segment(k, a.size()) += b[k] * a;
+  return out;
+}
+
+}  // namespace
+
 /// Adds the logs, then the channels; add_logs must come first.
 class EvidenceCollector {
  public:
@@ -199,6 +221,12 @@ class EvidenceCollector {
       : model_(model), signals_(in_order(suspects, references)) {
     evidence_.options = options;
     evidence_.suspects = suspects.size();
+    if (options.whole_motions) return;
+    own_.reserve(signals_.size());
+    for (const MachineSignals*& s : signals_) {
+      own_.push_back(with_accelerations_of_filter(model.machine, *s));
+      s = &own_.back();
+    }
   }
 
   /// @param in_references effects that act in the references; null: those of the model
@@ -235,6 +263,7 @@ class EvidenceCollector {
   const CraneModel& model_;
   Evidence evidence_;
   std::vector<const MachineSignals*> signals_;      // suspect logs first, then references
+  std::vector<MachineSignals> own_;                 // with the accelerations of their own filter
   std::vector<double> gain_force_, gain_pressure_;  // by log: gains of the filters on white noise
 };
 
@@ -269,13 +298,14 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
 void EvidenceCollector::add_kernels(const MachineSignals& signals) {
   Evidence::Kernels k;
   if (options().whole_motions) {
-    k.force = k.speed = k.pressure = VectorXd::Ones(1);
+    k.force = k.speed = k.pressure = k.behind_force = VectorXd::Ones(1);
   } else {
     k.force = low_pass_of(signals.step, signals.window, signals.order, 2);
     k.speed = low_pass_of(signals.step, signals.window, signals.order, 1);
     k.pressure = low_pass_of(signals.step, signals.window, signals.order, 0);
+    k.behind_force = raised_cosine(options().force_windows * signals.window / signals.step);
   }
-  gain_force_.push_back(k.force.norm());
+  gain_force_.push_back(full_convolution(k.force, k.behind_force).norm());
   gain_pressure_.push_back(k.pressure.norm());
   evidence_.kernels_.push_back(std::move(k));
 }
@@ -313,15 +343,17 @@ void EvidenceCollector::add_force_channel(int cylinder) {
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_force()) continue;
-    const VectorXd y = e.filter(log, EvidenceKind::kForce, c.force) - c.static_force -
-                       e.smooth_known(log, EvidenceKind::kForce, cylinder);
+    const VectorXd y =
+        e.behind_force(log, e.filter(log, EvidenceKind::kForce, c.force) - c.static_force -
+                                e.smooth_known(log, EvidenceKind::kForce, cylinder));
     b.channel.raw.resize(signals_.size());
     b.channel.raw[log] = c.force - c.static_force - e.known(log, EvidenceKind::kForce, cylinder);
     for (const double f : c.static_force) {
       if (std::isfinite(f))
         b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
     }
-    b.add(log, c.moving && signals_[log]->usable, y, MatrixXd(y.size(), 0), margin_of(log));
+    b.add(log, c.moving && signals_[log]->usable, y, MatrixXd(y.size(), 0),
+          margin_of(log) + e.kernels_[log].behind_force.size() / 2);
     if (is_suspect(log)) noise.add(c.force, gain_force_[log]);
   }
   b.channel.noise_floor = noise.value();

@@ -153,6 +153,10 @@ struct EvidenceOptions {
   /// @threshold [Pa] 0..1e6; chosen: an anti-cavitation valve holds tank pressure less its cracking pressure, some 1 bar, and a
   /// sensor's offset and noise add another
   double void_pressure = 2e5;
+  /// Width of the further low-pass of forces over that of the signals' filter; 0: none.
+  /// @threshold [1] 0..4; chosen: noise of the accelerations, which falls with the power 2.5 of the width, is then below that of the
+  /// pressures on plants of the simulator, whose boom left 4.4 kN without and 0.5 kN with it; the lowest natural frequencies pass
+  double force_windows = 2.0;
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows
   /// would cost time and add no information

@@ -324,6 +324,20 @@ MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signa
   return out;
 }
 
+MachineSignals with_accelerations_of_filter(const Machine& machine, MachineSignals signals) {
+  const SavitzkyGolay filter(signals.time, signals.runs, signals.window, signals.order);
+  for (int j = 0; j < machine.joint_count(); ++j) {
+    const VectorXd own = filter.apply(signals.q_measured.col(j), 2);
+    const VectorXd change = own - signals.qdd.col(j);
+    for (std::size_t i = 0; i < signals.cylinders.size(); ++i) {
+      CylinderSignals& c = signals.cylinders[i];
+      if (machine.cylinders[i].joint == j) c.acceleration += c.rate.cwiseProduct(change);
+    }
+    signals.qdd.col(j) = own;
+  }
+  return signals;
+}
+
 MachineSignals make_signals(const Machine& machine, const Log& log, const SignalOptions& options) {
   if (const std::string parts = parts_of(machine);
       !log.machine_parts.empty() && log.machine_parts != parts)

@@ -144,6 +144,10 @@ MachineSignals make_signals(const Machine& machine, const Log& log,
 MachineSignals smoothed_anew(const Machine& machine, const MachineSignals& signals, double window_s,
                              const SignalOptions& options = {});
 
+/// The signals with the accelerations of their own filter. Those of make_signals are of wider windows where they are steady
+/// (quieten_acceleration), so that the same low-pass of a force leaves oscillations in it which they do not have.
+MachineSignals with_accelerations_of_filter(const Machine& machine, MachineSignals signals);
+
 /// Joint coordinates of a series of strokes by Newton's method from the sample before, or by the bracketed
 /// `joint_at_stroke` where that fails. Error below 1e-10 rad.
 /// @param strokes [samples] [m]  @param unreachable gets the number of samples without a joint coordinate
