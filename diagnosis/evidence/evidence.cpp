@@ -62,8 +62,9 @@ VectorXd Evidence::filter(std::size_t log, EvidenceKind kind, const VectorXd& x)
   return convolved(x, kernel, series[log].runs);
 }
 
-VectorXd Evidence::behind_force(std::size_t log, const VectorXd& x) const {
-  const VectorXd& kernel = kernels_[log].behind_force;
+VectorXd Evidence::behind_force(std::size_t log, int cylinder, const VectorXd& x) const {
+  if (kernels_.empty()) return x;  // channels that were not made from logs
+  const VectorXd& kernel = kernels_[log].behind_force[static_cast<std::size_t>(cylinder)];
   return kernel.size() > 1 ? convolved(x, kernel, series[log].runs) : x;
 }
 
@@ -149,8 +150,9 @@ Eigen::MatrixXd Evidence::columns(const EffectAt& effect, std::span<const double
       raw += inertial.unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; });
     if (channel.kind == EvidenceKind::kForce) {
       for (Index c = 0; c < raw.cols(); ++c)
-        raw.col(c) = behind_force(
-            log, raw.col(c).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
+        raw.col(c) =
+            behind_force(log, channel.index,
+                         raw.col(c).unaryExpr([](double v) { return std::isfinite(v) ? v : 0.0; }));
     }
     if (result.size() == 0) result.setZero(channel.rows(), raw.cols());
     for (std::size_t b = 0; b < channel.blocks.size(); ++b) {

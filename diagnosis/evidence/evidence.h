@@ -107,14 +107,14 @@ struct Evidence {
   friend class EvidenceCollector;
   struct Kernels {  // low-pass kernels of one log, centred, of odd length
     Eigen::VectorXd force, speed, pressure;
-    Eigen::VectorXd behind_force;  // of forces and their signatures behind all others
+    std::vector<Eigen::VectorXd> behind_force;  // by cylinder: of its force behind all others
   };
   std::vector<Kernels> kernels_;
   std::vector<AppliedEffect> known_,
       known_in_references_;  // effects of the model that act in suspect logs, in reference logs
   Eigen::VectorXd filter(std::size_t log, EvidenceKind kind, const Eigen::VectorXd& x) const;
   /// What has passed the filter of a force, behind its further low-pass; x where there is none.
-  Eigen::VectorXd behind_force(std::size_t log, const Eigen::VectorXd& x) const;
+  Eigen::VectorXd behind_force(std::size_t log, int cylinder, const Eigen::VectorXd& x) const;
   const std::vector<AppliedEffect>& known_in(std::size_t log) const {
     return log < suspects ? known_ : known_in_references_;
   }

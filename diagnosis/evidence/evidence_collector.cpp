@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "diagnosis/evidence/branches.h"
 #include "diagnosis/evidence/channel_builder.h"
 #include "diagnosis/evidence/common_support.h"
 #include "diagnosis/evidence/evidence.h"
 #include "diagnosis/evidence/filled_chambers.h"
+#include "diagnosis/evidence/force_low_pass.h"
+#include "diagnosis/evidence/sensor_noise.h"
 #include "identification/learning/learn_pump.h"
 #include "identification/signals/load_sensing_leader.h"
 #include "identification/signals/low_pass.h"
@@ -26,35 +27,6 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-/// Standard deviation of a raw channel's white noise from third differences (robust, so that motion does not count).
-double raw_noise(const VectorXd& x, int fewest_differences) {
-  std::vector<double> d = third_differences(x, 0, x.size());
-  if (d.size() < static_cast<std::size_t>(fewest_differences)) return kNaN;
-  return robust_std(Eigen::Map<VectorXd>(d.data(), static_cast<Index>(d.size()))) /
-         kThirdDifferenceNoise;
-}
-
-/// Noise floor of a channel over several logs: the mean of those in which it is measured.
-class MeanNoise {
- public:
-  explicit MeanNoise(const EvidenceOptions& options) : fewest_(options.fewest_differences) {}
-
-  /// @param gain of the channel's filter on white noise
-  void add(const VectorXd& raw, double gain) {
-    const double noise = raw_noise(raw, fewest_);
-    if (!std::isfinite(noise)) return;
-    sum_ += noise * gain;
-    ++logs_;
-  }
-  /// NaN where no log measures it.
-  double value() const { return logs_ > 0 ? sum_ / logs_ : kNaN; }
-
- private:
-  int fewest_;  // differences
-  double sum_ = 0.0;
-  int logs_ = 0;
-};
 
 /// The supply or the return chamber of a cylinder that moves in one direction.
 struct ChamberRole {
@@ -191,27 +163,6 @@ BranchData branch_data(const MachineSignals& signals, const MachineSeries& serie
 
 }  // namespace
 
-namespace {
-
-/// Kernel of unit gain that falls to zero as a cosine (F. J. Harris (1978), Proc. IEEE 66, 51, the Hann window).
-/// @param width full width [samples]
-VectorXd raised_cosine(double width) {
-  const auto half = static_cast<Index>(std::lround(0.5 * width));
-  const VectorXd at =
-      VectorXd::LinSpaced(2 * half + 1, -static_cast<double>(half), static_cast<double>(half)) *
-      (std::numbers::pi / static_cast<double>(half + 1));
-  const VectorXd kernel = 1.0 + at.array().cos();
-  return kernel / kernel.sum();
-}
-
-VectorXd full_convolution(const VectorXd& a, const VectorXd& b) {
-  VectorXd out = VectorXd::Zero(a.size() + b.size() - 1);
-  for (Index k = 0; k < b.size(); ++k) out.segment(k, a.size()) += b[k] * a;
-  return out;
-}
-
-}  // namespace
-
 /// Adds the logs, then the channels; add_logs must come first.
 class EvidenceCollector {
  public:
@@ -262,15 +213,18 @@ class EvidenceCollector {
 
   const CraneModel& model_;
   Evidence evidence_;
-  std::vector<const MachineSignals*> signals_;      // suspect logs first, then references
-  std::vector<MachineSignals> own_;                 // with the accelerations of their own filter
-  std::vector<double> gain_force_, gain_pressure_;  // by log: gains of the filters on white noise
+  std::vector<const MachineSignals*> signals_;  // suspect logs first, then references
+  std::vector<MachineSignals> own_;             // with the accelerations of their own filter
+  std::vector<double> width_behind_force_;      // [s] by cylinder
+  std::vector<double> gain_pressure_;           // by log: gain of the filter on white noise
 };
 
 void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references) {
   Evidence& e = evidence_;
   e.known_ = model_.effects;
   e.known_in_references_ = in_references != nullptr ? *in_references : model_.effects;
+  for (int i = 0; i < model_.machine.cylinder_count(); ++i)
+    width_behind_force_.push_back(low_pass_width(model_.machine, signals_, i, e.options));
   for (std::size_t log = 0; log < signals_.size(); ++log) {
     const MachineSignals& s = *signals_[log];
     e.series.push_back(make_series(model_, s));
@@ -298,14 +252,15 @@ void EvidenceCollector::add_logs(const std::vector<AppliedEffect>* in_references
 void EvidenceCollector::add_kernels(const MachineSignals& signals) {
   Evidence::Kernels k;
   if (options().whole_motions) {
-    k.force = k.speed = k.pressure = k.behind_force = VectorXd::Ones(1);
+    k.force = k.speed = k.pressure = VectorXd::Ones(1);
+    k.behind_force.assign(width_behind_force_.size(), VectorXd::Ones(1));
   } else {
     k.force = low_pass_of(signals.step, signals.window, signals.order, 2);
     k.speed = low_pass_of(signals.step, signals.window, signals.order, 1);
     k.pressure = low_pass_of(signals.step, signals.window, signals.order, 0);
-    k.behind_force = raised_cosine(options().force_windows * signals.window / signals.step);
+    for (const double width : width_behind_force_)
+      k.behind_force.push_back(raised_cosine(width, signals.step));
   }
-  gain_force_.push_back(full_convolution(k.force, k.behind_force).norm());
   gain_pressure_.push_back(k.pressure.norm());
   evidence_.kernels_.push_back(std::move(k));
 }
@@ -334,7 +289,7 @@ void EvidenceCollector::add_force_channel(int cylinder) {
   Evidence& e = evidence_;
   ChannelBuilder b = builder(EvidenceKind::kForce, cylinder, {"N", 1.0});
   const std::string name = b.channel.at;
-  MeanNoise noise(e.options);
+  double noise = 0.0, suspects = 0.0;
   if (!e.options.settles && e.options.mechanisms.enabled(Mechanism::kSettling)) {
     for (const MachineSignals* s : signals_)
       b.since_change.push_back(since_unsteady(*s, s->cylinders[static_cast<std::size_t>(cylinder)],
@@ -344,8 +299,9 @@ void EvidenceCollector::add_force_channel(int cylinder) {
     const CylinderSignals& c = signals_[log]->cylinders[static_cast<std::size_t>(cylinder)];
     if (!c.has_force()) continue;
     const VectorXd y =
-        e.behind_force(log, e.filter(log, EvidenceKind::kForce, c.force) - c.static_force -
-                                e.smooth_known(log, EvidenceKind::kForce, cylinder));
+        e.behind_force(log, cylinder,
+                       e.filter(log, EvidenceKind::kForce, c.force) - c.static_force -
+                           e.smooth_known(log, EvidenceKind::kForce, cylinder));
     b.channel.raw.resize(signals_.size());
     b.channel.raw[log] = c.force - c.static_force - e.known(log, EvidenceKind::kForce, cylinder);
     for (const double f : c.static_force) {
@@ -353,10 +309,16 @@ void EvidenceCollector::add_force_channel(int cylinder) {
         b.channel.largest_force = std::max(b.channel.largest_force, std::abs(f));
     }
     b.add(log, c.moving && signals_[log]->usable, y, MatrixXd(y.size(), 0),
-          margin_of(log) + e.kernels_[log].behind_force.size() / 2);
-    if (is_suspect(log)) noise.add(c.force, gain_force_[log]);
+          margin_of(log) +
+              e.kernels_[log].behind_force[static_cast<std::size_t>(cylinder)].size() / 2);
+    if (!is_suspect(log)) continue;
+    const ForceNoise here(model_.machine, *signals_[log], cylinder, e.options);
+    if (!here.known()) continue;
+    const double width = width_behind_force_[static_cast<std::size_t>(cylinder)];
+    noise += std::hypot(here.of_pressures(width), here.of_accelerations(width));
+    suspects += 1.0;
   }
-  b.channel.noise_floor = noise.value();
+  b.channel.noise_floor = suspects > 0.0 ? noise / suspects : kNaN;
   if (!b.finish(e.channels)) {
     e.notes.push_back(
         fmt::format("{}: no measured force while it moves, force effects cannot be judged", name));

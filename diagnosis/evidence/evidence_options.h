@@ -153,10 +153,14 @@ struct EvidenceOptions {
   /// @threshold [Pa] 0..1e6; chosen: an anti-cavitation valve holds tank pressure less its cracking pressure, some 1 bar, and a
   /// sensor's offset and noise add another
   double void_pressure = 2e5;
-  /// Width of the further low-pass of forces over that of the signals' filter; 0: none.
-  /// @threshold [1] 0..4; chosen: noise of the accelerations, which falls with the power 2.5 of the width, is then below that of the
-  /// pressures on plants of the simulator, whose boom left 4.4 kN without and 0.5 kN with it; the lowest natural frequencies pass
-  double force_windows = 2.0;
+  /// Widths of the further low-pass of forces, which is as narrow as the noise of the accelerations allows (low_pass_width); none: no
+  /// low-pass.
+  /// @threshold [s] 0..2; chosen: half as wide again each; the widest still leaves most of a motion of some seconds, and the lowest
+  /// natural frequencies pass the narrower ones
+  std::vector<double> force_widths = {0.0, 0.2, 0.3, 0.45, 0.7, 1.0};
+  /// Noise of the accelerations that no low-pass is for, as a share of the largest measured force.
+  /// @threshold [1] 0..1; chosen: 0.1 % as ResidualModelOptions::smallest_force_share, a fraction of the error to which masses are known
+  double force_noise_share = 1e-3;
   /// Rows of a channel in one width of the filter.
   /// @threshold [1] 1..; chosen: rows a third of the width apart are nearly independent; more rows
   /// would cost time and add no information

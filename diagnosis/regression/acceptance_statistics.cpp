@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
@@ -52,6 +53,26 @@ double beyond_own_law(const EvidenceChannel& channel, const EffectAt& effect,
   return action.squaredNorm();
 }
 
+/// Products of an effect's action with the model-form error of another one, see EffectAction::over_form.
+class FormError {
+ public:
+  /// @param scale share of the model-form error over the square of the noise
+  void add(const std::vector<NoiseBlock>& blocks, const VectorXd& own, const VectorXd& other,
+           double scale) {
+    const VectorXd products = scale * own.cwiseProduct(other);
+    for (const NoiseBlock& b : blocks) {
+      const auto here = products.segment(b.first, b.last - b.first);
+      const bool forward = own.segment(b.first, b.last - b.first).sum() >= 0.0;
+      (forward ? forward_ : backward_) += here.sum();
+      apart_ += std::pow(here.cwiseAbs().sum(), 2);
+    }
+  }
+  double square() const { return forward_ * forward_ + backward_ * backward_ + apart_; }
+
+ private:
+  double forward_ = 0.0, backward_ = 0.0, apart_ = 0.0;
+};
+
 }  // namespace
 
 double form_share(const Effect& effect, const RegressionOptions& options) {
@@ -90,7 +111,8 @@ EffectAction effect_action(const Evidence& evidence,
                     fit.theta.segment(layout.first[k], designs[k]->linear));
   };
   EffectAction action;
-  double whole = 0.0, left = 0.0, most = 0.0, fourth = 0.0, form = 0.0;
+  double whole = 0.0, left = 0.0, most = 0.0;
+  std::map<const void*, FormError> form;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     if (!designs[index]->touches(c)) continue;
     const EvidenceChannel& channel = evidence.channels[c];
@@ -107,21 +129,20 @@ EffectAction effect_action(const Evidence& evidence,
       action.absorbed_where_seen = 1.0 - squares / here;
     }
     action.size = std::max(action.size, size_where_it_acts(own) / noise);
-    fourth += own.array().pow(4).sum() / std::pow(noise, 4);
     for (std::size_t k = 0; k < designs.size(); ++k) {
       if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
-      const VectorXd wrong =
-          form_share(*designs[k]->effect.effect, options) / noise * acts_in(k, c);
-      form += (wrong.cwiseProduct(own) / noise).squaredNorm();
+      const double share = form_share(*designs[k]->effect.effect, options);
+      form[designs[k]].add(channel.blocks, own, acts_in(k, c), share / (noise * noise));
     }
     for (const EvidenceChannel::SharedAction& s : channel.shared) {
       const double share = options.shared_form_share * form_share(*s.effect.effect, options);
-      const VectorXd wrong = share / noise * s.values;
-      form += (wrong.cwiseProduct(own) / noise).squaredNorm();
+      form[&s.effect].add(channel.blocks, own, s.values, share / (noise * noise));
     }
   }
   action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
-  if (form > 0.0) action.over_form = std::sqrt(fourth / form);
+  double squares = 0.0;
+  for (const auto& [by, error] : form) squares += error.square();
+  if (squares > 0.0) action.over_form = left / std::sqrt(squares);
   return action;
 }
 

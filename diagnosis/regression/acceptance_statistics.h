@@ -21,8 +21,12 @@ struct EffectAction {
             ///< all logs leaves
   double absorbed_where_seen =
       1.0;  ///< 0..1 absorbed share in the channel in which most of the effect remains
-  /// [-] size of the effect where it acts, divided by the model-form error of the other effects there (their
-  /// form_error times their action). An effect that is small by this measure compensates model-form error.
+  /// [-] size of the effect over the size that it would have from the model-form error of the others. That is their form_error times
+  /// their action times an unknown factor of the stretch of motion: a part that all stretches have alike in which the effect acts to the
+  /// same side, and one of each by itself, of either sign, which may follow the effect in that stretch. With s_b the products of both
+  /// actions in stretch b over the squares of the effect's,
+  ///   1 / over_form^2 = (sum of s_b, forward)^2 + (sum of s_b, backward)^2 + sum of (the same of their magnitudes, by row)^2,
+  /// so that what shows alike in many stretches is not taken for such an error. An effect that is small by this measure compensates it.
   double over_form = 1e9;
 };
 

@@ -44,8 +44,8 @@ struct SearchOptions {
   double smallest_effect = 0.15;
   /// Size below which a further effect is not named, as a multiple of the other effects' model-form
   /// error (EffectAction::over_form).
-  /// @threshold [1] 0..; chosen: a smaller effect may compensate that error
-  double smallest_over_form = 1.5;
+  /// @threshold [1] 0..; derived: twice the standard deviation of what that error makes of the effect, 95 % of a normal distribution
+  double smallest_over_form = 2.0;
   /// Absorbed share of a pressure or pump effect above which it is not named.
   /// @threshold [1] 0..1; chosen: learning the pressure models again would take over all but a
   /// tenth

@@ -131,11 +131,12 @@ void trace_found(const SearchState& search, const std::vector<FoundEffect>& foun
                  const EffectFit& fit) {
   const FoundEffect& f = found.back();
   fmt::print(stderr,
-             "  + {} shape [{:.4g}] theta [{:.5g}] size {:.2f} absorbed {:.2f} held out {:.1f} "
+             "  + {} shape [{:.4g}] theta [{:.5g}] size {:.2f} over form {:.2g} absorbed {:.2f} "
+             "held out {:.1f} "
              "+- {:.1f}, by chance {:.2g}\n",
              search.key(f.design.effect), fmt::join(f.design.shape, " "),
              fmt::join(std::vector<double>(fit.theta.begin(), fit.theta.end()), " "), f.size,
-             f.absorbed, f.held_out, f.held_out_error, f.held_out_chance);
+             f.over_form, f.absorbed, f.held_out, f.held_out_error, f.held_out_chance);
   for (std::size_t c = 0; c < search.evidence.channels.size(); ++c) {
     const EvidenceChannel& ch = search.evidence.channels[c];
     fmt::print(stderr,

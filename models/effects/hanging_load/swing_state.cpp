@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <utility>
+
+#include "models/machine/inertial_torque.h"
 
 namespace sparflow {
 namespace {
@@ -62,18 +65,37 @@ class SwingForces {
   struct Cylinder {
     MatrixX3d per_pull;  // [kg] N per m/s^2, freed
     VectorXd beyond;     // [N] measured less static, freed
-    double weight = 0.0;
+    double weight = 0.0, rows = 0.0;
   };
   std::vector<Index> rows_;
   std::vector<Cylinder> cylinders_;
   std::vector<MatrixXd> basis_;
 };
 
+/// Torques that accelerate the machine with its payload fixed to the tip; NaN where they are not known. [rows x joints]
+MatrixXd rigid_torques(const MachineSeries& log, const std::vector<Index>& rows) {
+  const Machine& machine = *log.machine;
+  MatrixXd out = MatrixXd::Constant(static_cast<Index>(rows.size()), machine.joint_count(),
+                                    std::numeric_limits<double>::quiet_NaN());
+  for (Index j = 0; j < out.rows(); ++j) {
+    const Index i = rows[static_cast<std::size_t>(j)];
+    const VectorXd q = log.q.row(i), qd = log.qd.row(i), qdd = log.qdd.row(i);
+    if (!q.allFinite() || !qd.allFinite() || !qdd.allFinite()) continue;
+    try {
+      out.row(j) = inertial_torque<double>(machine, q, qd, qdd, log.payload[i]);
+    } catch (const std::domain_error&) {
+      // a measured posture in which a linkage cannot close
+    }
+  }
+  return out;
+}
+
 SwingForces::SwingForces(const MachineSeries& log, const TipMotion& tip, const LoadPart& part,
                          Index stride) {
   const Machine& machine = *log.machine;
   for (Index i = part.first; i < part.last; i += stride) rows_.push_back(i);
   const auto n = static_cast<Index>(rows_.size());
+  const MatrixXd rigid = rigid_torques(log, rows_);
   for (std::size_t k = 0; k < machine.cylinders.size(); ++k) {
     const int joint = machine.cylinders[k].joint;
     const CylinderSeries& s = log.cylinders[k];
@@ -81,24 +103,26 @@ SwingForces::SwingForces(const MachineSeries& log, const TipMotion& tip, const L
     Cylinder c;
     c.per_pull.setZero(n, 3);
     c.beyond.setZero(n);
-    MatrixXd others = MatrixXd::Zero(n, 3);
+    MatrixXd others = MatrixXd::Zero(n, 4);
     for (Index j = 0; j < n; ++j) {
       const Index i = rows_[static_cast<std::size_t>(j)];
       const double y = s.force[i] - s.static_force[i];
-      const bool known = std::isfinite(y) && std::isfinite(s.acceleration[i]) &&
-                         tip.acceleration.row(i).allFinite();
+      const bool known = s.direction[i] != 0 && std::isfinite(y) && std::isfinite(s.speed[i]) &&
+                         std::isfinite(rigid(j, joint)) && tip.acceleration.row(i).allFinite();
       if (!known || s.rate[i] == 0.0) continue;  // at a dead centre a force holds no load
       c.beyond[j] = y;
+      c.rows += 1.0;
       c.per_pull.row(j) = tip.jacobian.row(i).segment<3>(Index{3} * joint) *
                           (machine.tip.payload_scale * log.payload[i] / s.rate[i]);
-      others.row(j) << 1.0, static_cast<double>(s.direction[i]), s.acceleration[i];
+      others.row(j) << 1.0, static_cast<double>(s.direction[i]), s.speed[i],
+          rigid(j, joint) / s.rate[i];
     }
     if (c.per_pull.isZero(0.0)) continue;
     const Eigen::ColPivHouseholderQR<MatrixXd> qr(others);
     basis_.push_back(qr.householderQ() * MatrixXd::Identity(n, qr.rank()));
     const MatrixXd& b = basis_.back();
     c.beyond -= b * (b.transpose() * c.beyond);
-    c.weight = 1.0 / std::max(c.beyond.norm() / std::sqrt(static_cast<double>(n)), 1e-9);
+    c.weight = 1.0 / std::max(c.beyond.norm() / std::sqrt(c.rows), 1e-9);
     cylinders_.push_back(std::move(c));
   }
 }
@@ -128,8 +152,7 @@ void SwingForces::weigh(const MatrixX3d& pull) {
   const auto n = static_cast<Index>(rows_.size());
   for (std::size_t k = 0; k < cylinders_.size(); ++k)
     cylinders_[k].weight /= std::max(
-        left.segment(n * static_cast<Index>(k), n).norm() / std::sqrt(static_cast<double>(n)),
-        1e-3);
+        left.segment(n * static_cast<Index>(k), n).norm() / std::sqrt(cylinders_[k].rows), 1e-3);
 }
 
 /// Motion of the weight through a part, on the rows compared.
@@ -148,6 +171,8 @@ class SwingMotion {
     return a.allFinite() ? Vector3d((gravity_ - a) / rope_) : Vector3d(gravity_ / rope_);
   }
   /// @param pull [rows x 3], resized. @return the state at the last row
+  /// Between two rows the pull is linear with the mean of its samples, so that noise of the accelerations adds up to no more than that
+  /// of the positions.
   Pendulum run(Pendulum p, const std::vector<Index>& rows, MatrixX3d* pull) const {
     const auto n = static_cast<Index>(rows.size());
     pull->resize(n, 3);
@@ -157,12 +182,19 @@ class SwingMotion {
       const Vector3d now = pull_at(i);
       if (j > 0) {
         const Index last = rows[static_cast<std::size_t>(j - 1)];
-        p.move(before, now, log_.time[i] - log_.time[last], swing_);
+        const Vector3d shift = mean_pull(last, i) - 0.5 * (before + now);
+        p.move(before + shift, now + shift, log_.time[i] - log_.time[last], swing_);
       }
       pull->row(j) = rope_ * p.slope(now, swing_.decay);
       before = now;
     }
     return p;
+  }
+  /// Of the samples from one row to another, by the trapezoidal rule.
+  Vector3d mean_pull(Index from, Index to) const {
+    Vector3d sum = 0.5 * (pull_at(from) + pull_at(to));
+    for (Index i = from + 1; i < to; ++i) sum += pull_at(i);
+    return sum / static_cast<double>(to - from);
   }
   /// @param x deflection across the rope and its rate over the frequency [rad]
   Pendulum deflected(const Pendulum& p, const Vector4d& x) const {

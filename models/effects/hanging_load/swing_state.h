@@ -16,8 +16,9 @@ struct LoadPart {
 };
 
 /// Parts of a log with the state that fits the cylinders' measured forces best, by nonlinear least squares with a prior: the state
-/// in which the part before has ended, or a weight at rest when a run begins. Each cylinder's force is compared without its mean, its
-/// friction and the part along its acceleration, since these are other effects'; the whole logged payload hangs.
+/// in which the part before has ended, or a weight at rest when a run begins. Each cylinder's force is compared while it moves, since
+/// friction carries the load of one at rest, and without its mean, its friction and the part along the force that accelerates the machine
+/// with a fixed payload, since these are other effects'; the whole logged payload hangs.
 /// @param rope [m] > 0  @param damping ratio of the free sway [-] >= 0
 std::vector<LoadPart> swinging_parts(const MachineSeries& log, const TipMotion& tip, double rope,
                                      double damping);

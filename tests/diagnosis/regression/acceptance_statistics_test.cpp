@@ -109,26 +109,49 @@ TEST(EffectAction, SizeIsComparedWithTheModelFormErrorOfOthers) {
   EffectDesign large = plain_design({ones});
   EffectFit fit = fit_effects(e, {&small, &large});
   fit.theta << 10.0, 100.0;
+  // what all stretches have alike, and what each of the 20 may have by itself
+  const double alike = std::sqrt(1.0 + 1.0 / 20.0);
   // model-form errors: a tenth of a flow limit's action, 5 % of friction, 2 % of a weight
   large.effect.effect = find_effect("flow_saturation");
-  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 1.0, 1e-9);
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 1.0 / alike, 1e-9);
   large.effect.effect = find_effect("viscous_friction");
-  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 2.0, 1e-9);
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 2.0 / alike, 1e-9);
   large.effect.effect = find_effect("unmodelled_mass");
-  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0, 1e-9);
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, 5.0 / alike, 1e-9);
 }
 
 TEST(EffectAction, HalfOfTheFormErrorOfALawThatBothLogsHaveIsTheSameInBoth) {
   const VectorXd ones = VectorXd::Ones(kRows);
   Evidence e = evidence_with(110.0 * ones, 1.0, 6);
+  const double alike = std::sqrt(1.0 + 1.0 / 20.0);  // see the test before
   const EffectDesign small = plain_design({ones});
   EffectFit fit = fit_effects(e, {&small});
   fit.theta << 10.0;
   e.channels[0].shared = {{{find_effect("flow_saturation"), 0}, 100.0 * ones}};
-  EXPECT_NEAR(effect_action(e, {&small}, 0, fit).over_form, 2.0, 1e-9);
+  EXPECT_NEAR(effect_action(e, {&small}, 0, fit).over_form, 2.0 / alike, 1e-9);
   RegressionOptions whole;
   whole.shared_form_share = 1.0;
-  EXPECT_NEAR(effect_action(e, {&small}, 0, fit, whole).over_form, 1.0, 1e-9);
+  EXPECT_NEAR(effect_action(e, {&small}, 0, fit, whole).over_form, 1.0 / alike, 1e-9);
+}
+
+/// A law that pushes now this way and now that way in the 20 stretches is an error of each by itself, whose sum in an effect that has the
+/// same sign in all of them is sqrt(20) times that of one; within a stretch it may follow the effect.
+TEST(EffectAction, ErrorsOfFormThatStretchesDoNotShareAverageOut) {
+  const VectorXd ones = VectorXd::Ones(kRows);
+  const Evidence e = evidence_with(10.0 * ones, 1.0, 6);
+  const EffectDesign small = plain_design({ones});
+  VectorXd by_turns = ones, within = ones;
+  for (std::size_t b = 0; b < blocks().size(); ++b) {
+    if (b % 2 == 1) by_turns.segment(blocks()[b].first, 50) *= -1.0;
+    within.segment(blocks()[b].first, 25) *= -1.0;
+  }
+  for (const VectorXd& other : {by_turns, within}) {
+    EffectDesign large = plain_design({other});
+    large.effect.effect = find_effect("flow_saturation");  // a tenth
+    EffectFit fit = fit_effects(e, {&small, &large});
+    fit.theta << 10.0, 100.0;
+    EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form, std::sqrt(20.0), 1e-9);
+  }
 }
 
 // The law that both logs have takes two thirds of a change of it where the suspect log has two thirds of the motion. No learned law

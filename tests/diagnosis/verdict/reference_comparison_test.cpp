@@ -276,10 +276,12 @@ Diagnosis with_decays(const Decays& decays) {
   auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
   logs.reference.time *= 12.0;
   const EffectAt friction{find_effect("stribeck_friction"), loader().cylinder_index("boom")};
+  EvidenceOptions options;
+  options.force_widths.clear();  // short stretches have rows behind no filter but the signals' own
   Diagnosis d;
   d.evidence =
       collect_evidence(CraneModel::untrained(loader()), {make_signals(loader(), logs.train)},
-                       {make_signals(loader(), logs.reference)});
+                       {make_signals(loader(), logs.reference)}, nullptr, options);
   const auto at = d.evidence.find(EvidenceKind::kForce, friction.at) - d.evidence.channels.data();
   EvidenceChannel& channel = d.evidence.channels[static_cast<std::size_t>(at)];
   std::mt19937_64 random(2);
@@ -341,6 +343,7 @@ Diagnosis with_sizes(const Sizes& sizes) {
   const auto logs = testing_support::hidden_case(loader(), {}, {5, 90.0});
   const EffectAt friction{find_effect("coulomb_friction"), 1};
   EvidenceOptions options;
+  options.force_widths.clear();  // the numbers of the tests are of stretches as they are without
   if (sizes.known > 0.0) options.shared = {{friction.effect, friction.at, {sizes.known}, {}, {}}};
   Diagnosis d;
   d.evidence =
