@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "models/effects/effect.h"
 #include "models/effects/hanging_load/swing_state.h"
+#include "models/effects/tip_motion.h"
 #include "models/machine/kinematics.h"
 #include "tests/models/effects/effects_support.h"
 
@@ -202,6 +204,89 @@ TEST_F(PayloadSway, SwingsOnAsTheForcesTell) {
     EXPECT_GT((at_rest.col(0) - truth.col(i)).norm(), 0.3 * all) << i;
   }
   EXPECT_EQ(sway.values_from_measurement(told), 4);
+}
+
+/// A log whose forces show a load that swings from the first sample on, from a state that only they tell.
+struct SwingingLoad {
+  MachineSeries log;
+  std::vector<Vector3d> beyond;  // acceleration of the pull beyond a fixed load [m/s^2]
+};
+
+SwingingLoad swinging_load(const Machine& machine, MachineSeries log, double rope) {
+  const std::vector<Vector3d> pull =
+      rope_pull(machine, log.time, rope, {Vector3d(0.4, -0.3, 0.0), Vector3d(0.5, 0.8, 0.0)});
+  SwingingLoad out{std::move(log), {}};
+  for (Index k = 0; k < out.log.samples(); ++k)
+    out.beyond.push_back(pull[static_cast<std::size_t>(k)] -
+                         tip_acceleration(machine, out.log.time[k]));
+  for (int i = 0; i < machine.cylinder_count(); ++i) {
+    CylinderSeries& s = out.log.cylinders[static_cast<std::size_t>(i)];
+    const int joint = machine.cylinders[static_cast<std::size_t>(i)].joint;
+    s.force = s.static_force;
+    for (Index k = 0; k < out.log.samples(); ++k) {
+      const Eigen::Matrix3Xd jacobian = point_jacobian_matrix(machine, VectorXd(out.log.q.row(k)),
+                                                              machine.tip.joint, machine.tip.xyz);
+      s.force[k] += machine.tip.payload_scale * kPayload *
+                    jacobian.col(joint).dot(out.beyond[static_cast<std::size_t>(k)]) / s.rate[k];
+    }
+    s.direction = s.speed.unaryExpr([](double v) { return v > 0.0 ? 1 : -1; });
+  }
+  return out;
+}
+
+/// RMS error of the pull, over its RMS.
+double error_of_pull(const SwingingLoad& load, const TipMotion& tip, double rope) {
+  const Eigen::MatrixX3d pull = pull_of_hanging_weight(
+      load.log, tip.acceleration, rope, kDamping, swinging_parts(load.log, tip, rope, kDamping));
+  double squares = 0.0, all = 0.0;
+  for (Index k = 0; k < load.log.samples(); ++k) {
+    const Vector3d& truth = load.beyond[static_cast<std::size_t>(k)];
+    squares += (Vector3d(pull.row(k)) - truth).squaredNorm();
+    all += truth.squaredNorm();
+  }
+  return std::sqrt(squares / all);
+}
+
+/// Positions that scatter make accelerations that scatter, whose sum over a swing is no more than the positions'. The states of the load are
+/// compared on every quarter of a radian only, and must not miss the samples between: the pull by the state that is found and by the
+/// true one, with the same accelerations.
+TEST_F(PayloadSway, NoiseOfAccelerationsDoesNotAddUp) {
+  constexpr double kRope = 1.5;
+  const SwingingLoad load = swinging_load(machine, log, kRope);
+  TipMotion tip = tip_motion(load.log);
+  const std::vector<LoadPart> truth = swinging_parts(load.log, tip, kRope, kDamping);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  constexpr Index kHalf = 25;  // of a triangle: 0.1 s
+  const Index n = load.log.samples();
+  for (int axis = 0; axis < 3; ++axis) {
+    const VectorXd white =
+        VectorXd::NullaryExpr(n + 2 * kHalf, [&] { return 2e-4 * normal(random); });  // [m]
+    for (Index k = 0; k < n; ++k) {
+      // second derivative of the scatter behind a triangle: its two steps of slope
+      const double change = white[k] - 2.0 * white[k + kHalf] + white[k + 2 * kHalf];
+      tip.acceleration(k, axis) += change / std::pow(load.log.step * kHalf, 2);
+    }
+  }
+  const auto pull = [&](const std::vector<LoadPart>& parts) {
+    return pull_of_hanging_weight(load.log, tip.acceleration, kRope, kDamping, parts);
+  };
+  const Eigen::MatrixX3d exact = pull(truth);
+  EXPECT_LT((pull(swinging_parts(load.log, tip, kRope, kDamping)) - exact).norm(),
+            0.02 * exact.norm());
+}
+
+/// Friction carries the load of a cylinder at rest, whose force then tells nothing.
+TEST_F(PayloadSway, CylindersAtRestTellNothingOfTheSwing) {
+  constexpr double kRope = 1.5;
+  SwingingLoad load = swinging_load(machine, log, kRope);
+  const TipMotion tip = tip_motion(load.log);
+  const Index rests = load.log.samples() / 2;
+  for (CylinderSeries& s : load.log.cylinders) {
+    s.direction.head(rests).setZero();
+    s.force.head(rests) = s.static_force.head(rests);
+  }
+  EXPECT_LT(error_of_pull(load, tip, kRope), 0.05);
 }
 
 TEST_F(PayloadSway, VanishesWithTheRope) {
