@@ -37,7 +37,7 @@ class ForceNoise {
 /// @param width full width [s]; below two steps: no low-pass  @param step [s] between samples
 Eigen::VectorXd raised_cosine(double width, double step);
 
-/// The narrowest width of EvidenceOptions::force_widths with which the accelerations make no more noise than the pressures, or than
+/// The narrowest width of EvidenceOptions::force_widths with which the accelerations make no more noise than thrice the pressures, or than
 /// matters (EvidenceOptions::force_noise_share), in any log; the widest where none is enough. [s]
 double low_pass_width(const Machine& machine, std::span<const MachineSignals* const> logs,
                       int cylinder, const EvidenceOptions& options);

@@ -109,7 +109,7 @@ TEST_F(ForceLowPass, IsAsWideAsTheNoiseOfThePositionsDemands) {
     const ForceNoise noise(machine, log, 0, options);
     if (width < options.force_widths.back()) {
       EXPECT_LE(noise.of_accelerations(width),
-                std::max(noise.of_pressures(width),
+                std::max(3.0 * noise.of_pressures(width),
                          options.force_noise_share * noise.largest_force()));
     }
   }
