@@ -19,6 +19,7 @@ struct Pendulum {
   /// Moves by dt [s] while the pull changes linearly from one value to another.
   void move(const Eigen::Vector3d& from, const Eigen::Vector3d& to, double dt,
             const SwingDecay& swing);
+
  private:
   Pendulum moved(const Eigen::Vector3d& by_down, const Eigen::Vector3d& by_rate) const {
     return {down + by_down, rate + by_rate};
