@@ -23,7 +23,7 @@ class ForceLowPass : public testing::Test {
   const Machine machine = testing_support::drawn_machine("loader_crane");
   MachineSignals log =
       make_signals(machine, testing_support::hidden_case(machine, {}, {5, 60.0}).train);
-  const EvidenceOptions options;
+  const EvidenceOptions options = {};
 
   /// Positions with white noise of this deviation in place of their own. [rad] or [m]
   void set_position_noise(double deviation) {
