@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
 
 #include "models/math/linear_algebra.h"
 #include "models/math/student.h"
@@ -112,7 +111,8 @@ EffectAction effect_action(const Evidence& evidence,
   };
   EffectAction action;
   double whole = 0.0, left = 0.0, most = 0.0;
-  std::map<const void*, FormError> form;
+  std::vector<FormError> form(designs.size());
+  double of_form = 0.0;
   for (std::size_t c = 0; c < evidence.channels.size(); ++c) {
     if (!designs[index]->touches(c)) continue;
     const EvidenceChannel& channel = evidence.channels[c];
@@ -132,17 +132,18 @@ EffectAction effect_action(const Evidence& evidence,
     for (std::size_t k = 0; k < designs.size(); ++k) {
       if (k == index || !designs[k]->touches(c) || designs[k]->effect.effect == nullptr) continue;
       const double share = form_share(*designs[k]->effect.effect, options);
-      form[designs[k]].add(channel.blocks, own, acts_in(k, c), share / (noise * noise));
+      form[k].add(channel.blocks, own, acts_in(k, c), share / (noise * noise));
     }
     for (const EvidenceChannel::SharedAction& s : channel.shared) {
       const double share = options.shared_form_share * form_share(*s.effect.effect, options);
-      form[&s.effect].add(channel.blocks, own, s.values, share / (noise * noise));
+      FormError error;
+      error.add(channel.blocks, own, s.values, share / (noise * noise));
+      of_form += error.square();
     }
   }
   action.absorbed = whole > 0.0 ? 1.0 - left / whole : 1.0;
-  double squares = 0.0;
-  for (const auto& [by, error] : form) squares += error.square();
-  if (squares > 0.0) action.over_form = left / std::sqrt(squares);
+  for (const FormError& error : form) of_form += error.square();
+  if (of_form > 0.0) action.over_form = left / std::sqrt(of_form);
   return action;
 }
 
