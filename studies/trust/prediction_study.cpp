@@ -226,7 +226,7 @@ OptimalMotions motions_of(const benchmark::Scenario& s, const CraneModel& model,
 void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
   std::filesystem::create_directories(folder);
   std::ofstream out(std::filesystem::path(folder) / (p.scenario.id + ".csv"));
-  out << "t";
+  out << "t,swing_1,swing_2";
   for (const Joint& j : p.scenario.machine.joints)
     out << fmt::format(",{0}_q,{0}_qd,{0}_plan_q,{0}_plan_qd", j.name);
   for (const Cylinder& c : p.scenario.machine.cylinders)
@@ -240,7 +240,7 @@ void write_trace(const std::string& folder, const Planned& p, const Driven& d) {
   for (std::size_t at = 0; at < d.records.size(); ++at) {
     const plant::Record& r = d.records[at];
     const MachineState& model = modelled(chain, p.scenario.machine, d, at);
-    out << r.t;
+    out << fmt::format("{},{},{}", r.t, r.swing_1, r.swing_2);
     const control::MotionInstant wanted = control::at_time(plan, r.t);
     for (std::size_t j = 0; j < r.q.size(); ++j) {
       const auto k = static_cast<Eigen::Index>(j);
