@@ -26,15 +26,6 @@ using Eigen::VectorXd;
 constexpr int kChords = 3;
 constexpr int kSweeps = 2;  // over all nonlinear parameters
 
-std::vector<double> shape_of(const AppliedEffect& e) {
-  std::vector<double> shape;
-  const auto& parameters = e.effect->info().parameters;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
-    if (!parameters[p].linear) shape.push_back(e.values[p]);
-  }
-  return shape;
-}
-
 /// Descriptions of the nonlinear parameters, in their order.
 std::vector<const EffectParameter*> shape_parameters(const Effect& effect) {
   std::vector<const EffectParameter*> out;
@@ -358,6 +349,15 @@ class Estimator {
 };
 
 }  // namespace
+
+std::vector<double> shape_of(const AppliedEffect& e) {
+  std::vector<double> shape;
+  const auto& parameters = e.effect->info().parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (!parameters[p].linear) shape.push_back(e.values[p]);
+  }
+  return shape;
+}
 
 EffectEstimate estimate_effects(const CraneModel& model, const std::vector<EffectAt>& wanted,
                                 EstimateLogs logs, const SearchProgress& progress,

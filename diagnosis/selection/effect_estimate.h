@@ -12,6 +12,9 @@
 
 namespace sparflow {
 
+/// The nonlinear parameters of an effect, in the order of its description. [SI]
+std::vector<double> shape_of(const AppliedEffect& effect);
+
 struct EstimateOptions {
   EvidenceOptions evidence;  ///< those of the diagnosis, so that both see the same rows
   /// Whether an effect that the model has is estimated as a difference to it, else anew.

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "diagnosis/selection/effect_estimate.h"
+
 namespace sparflow {
 
 using Eigen::Index;
@@ -29,23 +31,10 @@ EffectDesign design_in(const Evidence& evidence, const EffectDesign& found, Acti
   return design;
 }
 
-namespace {
-
-/// Whether both have the same nonlinear parameters and therefore proportional columns.
-bool same_shape(const AppliedEffect& a, const FoundEffect& b) {
-  std::vector<double> shape;
-  const std::vector<EffectParameter>& parameters = a.effect->info().parameters;
-  for (std::size_t p = 0; p < parameters.size(); ++p)
-    if (!parameters[p].linear) shape.push_back(a.values[p]);
-  return shape == b.design.shape;
-}
-
-}  // namespace
-
 bool is_shared(const Evidence& evidence, const FoundEffect& f) {
   const std::vector<AppliedEffect>& all = evidence.options.shared;
   return std::any_of(all.begin(), all.end(), [&](const AppliedEffect& e) {
-    return same_place(e, f.design.effect) && same_shape(e, f);
+    return same_place(e, f.design.effect) && shape_of(e) == f.design.shape;
   });
 }
 
