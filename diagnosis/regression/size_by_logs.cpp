@@ -64,28 +64,12 @@ double log_likelihood(const std::vector<BlockSize>& blocks, const Variation& v) 
   return sum;
 }
 
-/// Standard error of the weighted mean by leaving out one stretch of motion at a time (the jackknife; MacKinnon, Nielsen and Webb 2023, J.
-/// Econometrics 232, 272). A stretch that has nearly all the weight sets the mean, so that its own deviation from it tells nothing. An
-/// added variance bounds that weight, a common factor does not.
-double jackknife_error(const std::vector<BlockSize>& blocks, const Variation& v, double mean,
-                       double weights) {
-  double squares = 0.0;
-  for (const BlockSize& b : blocks) {
-    const double weight = 1.0 / v.variance(b);
-    squares += std::pow(weight * (b.size - mean) / (weights - weight), 2);
-  }
-  const double n = static_cast<double>(blocks.size());
-  return std::sqrt((n - 1.0) / n * squares);
-}
-
 SizeInLogs size_in_logs(const std::vector<BlockSize>& blocks, const Variation& v) {
   SizeInLogs s;
   s.blocks = static_cast<int>(blocks.size());
   double weights = 0.0;
   s.size = weighted_mean(blocks, v, weights);
   s.standard_error = weights > 0.0 ? 1.0 / std::sqrt(weights) : 0.0;
-  if (blocks.size() > 1 && v.added == 0.0)
-    s.standard_error = std::max(s.standard_error, jackknife_error(blocks, v, s.size, weights));
   return s;
 }
 

@@ -10,6 +10,7 @@
 #include "diagnosis/verdict/common_law.h"
 #include "diagnosis/verdict/designs_by_group.h"
 #include "diagnosis/verdict/diagnosed_effect.h"
+#include "diagnosis/verdict/law_comparison.h"
 #include "diagnosis/verdict/reference_faults.h"
 #include "diagnosis/verdict/residual_levels.h"
 #include "diagnosis/verdict/size_comparison.h"
@@ -155,8 +156,10 @@ std::optional<FoundEffect> explains_both(const Diagnosis& d, std::size_t found,
   if (!law) return {};
   Diagnosis with = d;
   with.search.found[found] = *law;
-  if (!joins_both(by_size(with, found, options).in_references)) return {};
-  return law;
+  if (joins_both(by_size(with, found, options).in_references) ||
+      as_good_as_own_laws(d, found, *law))
+    return law;
+  return {};
 }
 
 /// Compares sizes, and asks of a difference whether one law explains both groups of logs.
