@@ -154,6 +154,22 @@ TEST(EffectAction, ErrorsOfFormThatStretchesDoNotShareAverageOut) {
   }
 }
 
+/// What a law leaves is alike in the stretches of one direction; those of the other direction have a part of their own (the efficiency of a
+/// machine that drives and is driven), so that of an effect that acts both ways half of the square averages out.
+TEST(EffectAction, StretchesOfBothDirectionsHaveErrorsOfFormOfTheirOwn) {
+  VectorXd by_turns = VectorXd::Ones(kRows);
+  for (std::size_t b = 1; b < blocks().size(); b += 2)
+    by_turns.segment(blocks()[b].first, 50) *= -1.0;
+  const Evidence e = evidence_with(10.0 * by_turns, 1.0, 6);
+  const EffectDesign small = plain_design({by_turns});
+  EffectDesign large = plain_design({by_turns});
+  large.effect.effect = find_effect("flow_saturation");  // a tenth
+  EffectFit fit = fit_effects(e, {&small, &large});
+  fit.theta << 10.0, 100.0;
+  EXPECT_NEAR(effect_action(e, {&small, &large}, 0, fit).over_form,
+              1.0 / std::sqrt(1.0 / 2.0 + 1.0 / 20.0), 1e-9);
+}
+
 // The law that both logs have takes two thirds of a change of it where the suspect log has two thirds of the motion. No learned law
 // has any of that.
 TEST(EffectAction, WhatALawTakesOfItsOwnChangeIsNotAbsorbed) {
