@@ -129,22 +129,24 @@ double chance_of_signs(const std::vector<double>& gains) {
   return chance;
 }
 
-/// Whether a group of logs is explained worse by one law than by its own, in the mean or in most stretches of motion. Where the own law
-/// gains much in a few stretches its mean is not certain although most of them agree.
+/// Whether a group of logs is explained worse by one law than by its own.
 bool is_worse(const Diagnosis& d, const GroupOfLogs& group, const std::vector<double>& own,
               const std::vector<double>& law) {
   const std::vector<double> gains = group.gains(group.fit(own), group.fit(law));
-  if (gains.size() < 2) return true;
-  const double mean = chance_of_mean(gains), signs = chance_of_signs(gains);
+  const double chance = chance_of_gains_in(gains);
   if (tracing())
-    fmt::print(
-        stderr,
-        "    its own law is better by {:.4g} nats in {} stretches, by chance {:.2g}, {:.2g}\n",
-        std::accumulate(gains.begin(), gains.end(), 0.0), gains.size(), mean, signs);
-  return std::min(mean, signs) < d.thresholds.excess_false_alarm;
+    fmt::print(stderr,
+               "    its own law is better by {:.4g} nats in {} stretches, by chance {:.2g}\n",
+               std::accumulate(gains.begin(), gains.end(), 0.0), gains.size(), chance);
+  return chance < d.thresholds.excess_false_alarm;
 }
 
 }  // namespace
+
+double chance_of_gains_in(const std::vector<double>& stretches) {
+  if (stretches.size() < 2) return 0.0;  // one stretch does not say how far they scatter
+  return std::min(chance_of_mean(stretches), chance_of_signs(stretches));
+}
 
 bool as_good_as_own_laws(const Diagnosis& d, std::size_t found, const FoundEffect& law) {
   const EffectDesign& own = d.search.found[found].design;

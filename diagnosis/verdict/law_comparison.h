@@ -1,5 +1,7 @@
 #pragma once
 /// Two values of one law that replaces itself when it changes, compared by what they leave. Used by reference_comparison.cpp only.
+#include <vector>
+
 #include "diagnosis/verdict/diagnose.h"
 
 namespace sparflow {
@@ -13,5 +15,11 @@ namespace sparflow {
 /// @param found index into the effects found  @param law with the same effect at the same place
 /// @return false for an effect that adds to the law before, and where the logs have no such law so far
 bool as_good_as_own_laws(const Diagnosis& d, std::size_t found, const FoundEffect& law);
+
+/// The smaller of both tests' probabilities of such gains of the own law without any advantage: of their mean by Student's distribution, and
+/// of the number of stretches that gain. Where a law gains much in a few stretches and little in all others the mean is not certain.
+/// @param stretches log-likelihood of each stretch of motion by its own law less that by the other one [nats]
+/// @return 0 for fewer than two stretches
+double chance_of_gains_in(const std::vector<double>& stretches);
 
 }  // namespace sparflow

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "identification/signals/signals.h"
@@ -74,6 +75,26 @@ TEST(LawComparison, ALawOfOneGroupAloneIsNoLawOfBoth) {
   EXPECT_FALSE(explains_both(d, 0.6));  // worse in the references
   EXPECT_FALSE(explains_both(d, 0.2));  // worse in the suspect log
   EXPECT_FALSE(explains_both(d, 0.4));
+}
+
+TEST(LawComparison, AStretchThatGainsMuchIsNoAdvantageUnlessTheOthersGain) {
+  std::vector<double> gains(25);
+  for (std::size_t k = 0; k < gains.size(); ++k) gains[k] = k % 2 == 0 ? 1.0 : -1.5;
+  gains[0] = 150.0;
+  EXPECT_GT(chance_of_gains_in(gains), 0.1);
+  for (double& g : gains) g = std::abs(g);
+  EXPECT_NEAR(chance_of_gains_in(gains), std::pow(0.5, 25), 1e-12);  // all of 25
+  for (double& g : gains) g = -g;
+  EXPECT_GT(chance_of_gains_in(gains), 0.5);
+}
+
+/// Five of ten stretches gain and one loses: a chance of 7/64 by their number.
+TEST(LawComparison, AMeanThatIsCertainIsAnAdvantageHoweverFewStretchesGain) {
+  std::vector<double> gains(10, 0.0);
+  for (std::size_t k = 0; k < 5; ++k) gains[k] = 10.0 + static_cast<double>(k);
+  gains[9] = -1.0;
+  EXPECT_LT(chance_of_gains_in(gains), 0.03);    // 2.4 standard errors, nine degrees of freedom
+  EXPECT_EQ(chance_of_gains_in({1000.0}), 0.0);  // not known
 }
 
 TEST(LawComparison, ComparesOnlyWhatReplacesALawOfAllLogs) {
