@@ -140,8 +140,9 @@ struct VerdictOptions {
   /// @threshold [1] 0..1; tuned on seeds 14..21 of plant_verdicts: true changes behind large residuals have 0.0002 and less, untrue ones
   /// 0.0014 and more
   double difference_alone_false_alarm = 0.001;
-  /// Chance of a residual that exceeds that of the references so far without a found effect, from which on the effect is no
-  /// change but a law that is not exact. The effect has passed the test above already.
+  /// Chance of a residual that exceeds that of the references so far without a found effect, and of what the effect predicts of motions left
+  /// out, from which on the effect is no change but a law that is not exact, and of a gain of each group's own law over the one law of all
+  /// logs, from which on they are two. The effect has passed the test above already.
   /// @threshold [1] 0..0.5; chosen: one in twenty, in the effect's own channels
   double excess_false_alarm = 0.05;
   /// Share of the squared residual beyond that of the references which a found effect must explain in such a channel.

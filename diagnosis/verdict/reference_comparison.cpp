@@ -117,13 +117,13 @@ bool joins_both(InReferences there) {
   return there == InReferences::kAlike || there == InReferences::kVaries;
 }
 
-/// Whether a difference improves the prediction of motions left out, at the level of the sizes' difference. A law that is not exact
+/// Whether a difference, which has passed the test of its size already, improves the prediction of motions left out. A law that is not exact
 /// has another size in other motions, by a few of them.
 bool predicts_left_out(const Diagnosis& d, const FoundEffect& f) {
   if (tracing())
     fmt::print(stderr, "    gain on motions left out {:.4g} +- {:.2g} nats, by chance {:.2g}\n",
                f.held_out, f.held_out_error, f.held_out_chance);
-  return f.held_out_chance < d.thresholds.difference_false_alarm;
+  return f.held_out_chance < d.thresholds.excess_false_alarm;
 }
 
 /// Judges a significant difference by the motions left out and by the residuals of both groups of logs.

@@ -434,10 +434,10 @@ TEST(ReferenceComparison, AChangeMustPredictMotionsLeftOut) {
     d.search.found[0].held_out_chance = chance;
     return in_references(d, 0, {});
   };
-  EXPECT_EQ(compared(1000.0, 0.011), InReferences::kVaries);
-  EXPECT_EQ(compared(1000.0, 0.009), InReferences::kOther);
-  EXPECT_EQ(compared(0.0, 0.011), InReferences::kVaries);
-  EXPECT_EQ(compared(0.0, 0.009), InReferences::kNot);
+  EXPECT_EQ(compared(1000.0, 0.051), InReferences::kVaries);
+  EXPECT_EQ(compared(1000.0, 0.049), InReferences::kOther);
+  EXPECT_EQ(compared(0.0, 0.051), InReferences::kVaries);
+  EXPECT_EQ(compared(0.0, 0.049), InReferences::kNot);
 }
 
 /// A valve whose flow falls with the load has the signature of a leak in motion; both logs have it, so that a reference tells them apart.
